@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "berth/backend.hpp"
+#include "berth/camera.hpp"
+#include "berth/frame.hpp"
+#include "berth/image.hpp"
+
+namespace berth {
+
+/// Room for the lists a frame produces; 0 picks the default for the image size (docs/capacities.md).
+struct Capacities {
+  int run_ends = 0;
+  int contours = 0;
+  int points = 0;
+};
+
+struct DetectorConfig {
+  /// Family names; see family_names().
+  std::vector<std::string> families = {"tag36h11"};
+  /// Most wrong bits a code may have and still be accepted; never more than the family can correct.
+  int max_hamming = 2;
+  /// Camera and marker side (metres, the side the corners span); with both, detections get a pose.
+  std::optional<CameraModel> camera;
+  double marker_size_m = 0;
+  /// Per-pixel gain of the flat-field correction, row-major, 1 = unchanged; empty for none.
+  std::vector<float> flat_field;
+  Capacities capacities;
+  /// Compute StageDigests for every frame (downloads every stage's output; slow).
+  bool digests = false;
+};
+
+/// Finds markers in frames of one size on one backend. All memory is taken in the constructor.
+class Detector {
+ public:
+  /// Throws Error on a size outside 1…16384, an unknown family or a bad configuration.
+  Detector(Backend& backend, int width, int height, const DetectorConfig& config);
+  ~Detector();
+  Detector(Detector&&) noexcept;
+  Detector& operator=(Detector&&) noexcept;
+
+  /// Enqueues a frame. Copies the image; returns at once where the device is asynchronous. One frame in flight.
+  void submit(View2D<const u8> image, const FrameStamp& stamp);
+  /// Waits for the submitted frame and finishes it on the host. Valid until the next collect.
+  const FrameResult& collect();
+  /// submit and collect.
+  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {});
+
+  /// Bytes of device memory, all taken at start.
+  std::size_t device_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace berth

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "berth/image.hpp"
+#include "berth/marker.hpp"
+#include "berth/types.hpp"
+
+namespace berth {
+
+enum class FrameStatus { ok, no_target, overflow, late, device_lost };
+const char* name_of(FrameStatus status);
+
+/// Where and when a frame came from. Times are nanoseconds on the named clock.
+struct FrameStamp {
+  u64 sequence = 0;
+  std::int64_t exposure_start_ns = 0;
+  std::int64_t mid_exposure_ns = 0;
+  std::int64_t arrival_ns = 0;
+  const char* clock = "none";
+};
+
+/// How many of each item the frame needed and how many there was room for (see docs/capacities.md).
+struct CapacityUse {
+  const char* what = "";
+  u32 needed = 0;
+  u32 capacity = 0;
+};
+
+struct StageTime {
+  const char* stage = "";
+  std::int64_t ns = 0;
+};
+
+/// Hash of one stage's output; equal on every backend for equal input.
+struct StageDigest {
+  const char* stage = "";
+  u64 digest = 0;
+};
+
+/// Everything one frame produced: what is logged, published and replayed.
+struct FrameResult {
+  FrameStamp stamp;
+  FrameStatus status = FrameStatus::no_target;
+  std::vector<Detection> detections;
+  /// Quadrilaterals that were examined for a code.
+  int quads = 0;
+  std::array<CapacityUse, 3> capacities = {};
+  /// device: upload to download; decode; pose
+  std::array<StageTime, 3> times = {};
+  /// Filled only when the detector is asked for digests.
+  std::vector<StageDigest> digests;
+};
+
+}  // namespace berth

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "berth/camera.hpp"
+#include "berth/frame.hpp"
+#include "berth/image.hpp"
+#include "berth/marker.hpp"
+
+namespace berth {
+
+/// A marker that a simulated frame shows, as it truly is.
+struct TruthMarker {
+  std::string family;
+  int id = 0;
+  double size_m = 0;
+  /// Marker frame to camera frame, at mid-exposure.
+  Pose pose;
+  /// Paper's order (upper left of the upright marker first, counter-clockwise), px, pixel centres at integers.
+  std::array<std::array<double, 2>, 4> corners = {};
+  /// Share of the marker's area (quiet zone included) that is inside the image and not occluded, 0…1.
+  double visible = 1;
+};
+
+/// One frame of a source.
+struct SourceFrame {
+  GrayImage image;
+  FrameStamp stamp;
+  /// File name, or the source's own label for the frame.
+  std::string label;
+  /// Only simulated sources know.
+  std::vector<TruthMarker> truth;
+};
+
+/// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`; cameras later.
+class Source {
+ public:
+  virtual ~Source() = default;
+  /// The next frame, or none at the end. Throws Error on a frame that cannot be had; the next call goes on after it.
+  virtual std::optional<SourceFrame> next() = 0;
+  /// Frames in all, when known beforehand.
+  virtual std::optional<std::size_t> size() const { return std::nullopt; }
+  /// The source's own camera, where it knows one (simulation).
+  virtual std::optional<CameraModel> camera() const { return std::nullopt; }
+};
+
+}  // namespace berth
