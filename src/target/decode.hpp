@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "berth/image.hpp"
+#include "berth/marker.hpp"
+
+namespace berth {
+
+/// A quadrilateral the device found, before anyone looked inside. Corners clockwise on the screen from any corner,
+/// px, pixel centres at integer coordinates.
+struct QuadCandidate {
+  /// From the lines through the contour.
+  std::array<std::array<double, 2>, 4> coarse = {};
+  /// From the lines refitted to the gray-level edges; equal to coarse where has_fine is false.
+  std::array<std::array<double, 2>, 4> fine = {};
+  bool has_fine = false;
+  /// Light inside, dark outside.
+  bool reversed_border = false;
+};
+
+/// Reads the code inside quadrilaterals.
+class Decoder {
+ public:
+  Decoder(std::vector<const MarkerFamily*> families, int max_hamming);
+
+  /// Tries the fine corners, then the coarse ones. Returns whether a code of a family was read into `detection`,
+  /// whose corners are then the fine ones in the paper's order.
+  bool decode(View2D<const u8> image, const QuadCandidate& quad, Detection& detection) const;
+
+ private:
+  struct Table;
+  std::vector<Table> tables_;
+};
+
+/// Of detections that cover the same place keeps the best (Hamming distance, margin, area, then position: a total
+/// order) and sorts what remains by family, id and position, so that the list never depends on the order of arrival.
+void resolve_duplicates(std::vector<Detection>& detections);
+
+}  // namespace berth

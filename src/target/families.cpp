@@ -1,0 +1,104 @@
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "berth/error.hpp"
+#include "berth/marker.hpp"
+
+namespace berth {
+namespace {
+
+// One line of the generated tables.
+struct FamilyTable {
+  const char* name;
+  int border_width;
+  int total_width;
+  bool reversed_border;
+  int min_hamming;
+  int bits;
+  int count;
+  const signed char* bit_x;
+  const signed char* bit_y;
+  const signed char* turn;
+  const u64* codes;
+};
+
+#include BERTH_FAMILIES_INC_FILE
+
+constexpr int kFamilyCount = static_cast<int>(sizeof kFamilyTables / sizeof kFamilyTables[0]);
+
+std::unique_ptr<const MarkerFamily> make_family(const FamilyTable& table) {
+  auto family = std::make_unique<MarkerFamily>();
+  family->name = table.name;
+  family->border_width = table.border_width;
+  family->total_width = table.total_width;
+  family->reversed_border = table.reversed_border;
+  family->min_hamming = table.min_hamming;
+  family->bit_x.assign(table.bit_x, table.bit_x + table.bits);
+  family->bit_y.assign(table.bit_y, table.bit_y + table.bits);
+  family->rotation.assign(table.turn, table.turn + table.bits);
+  family->codes.assign(table.codes, table.codes + table.count);
+  return family;
+}
+
+// Levenshtein distance, for the "did you mean" of an unknown name.
+int edit_distance(const std::string& a, const std::string& b) {
+  std::vector<int> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    int diagonal = row[0];
+    row[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const int replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
+std::string near_names(const std::string& name) {
+  std::vector<std::pair<int, std::string>> order;
+  for (const std::string& known : family_names()) order.emplace_back(edit_distance(lower(name), lower(known)), known);
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::string text;
+  for (std::size_t i = 0; i < 3 && i < order.size(); ++i) text += (i == 0 ? "" : ", ") + order[i].second;
+  return text;
+}
+
+}  // namespace
+
+const std::vector<std::string>& family_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> result;
+    for (const FamilyTable& table : kFamilyTables) result.emplace_back(table.name);
+    return result;
+  }();
+  return names;
+}
+
+const MarkerFamily& family(const std::string& name) {
+  // Immutable once made, and made only when asked for: the large families are half a megabyte each.
+  static std::mutex mutex;
+  static std::unique_ptr<const MarkerFamily> families[kFamilyCount];
+  for (int i = 0; i < kFamilyCount; ++i) {
+    if (name != kFamilyTables[i].name) continue;
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (!families[i]) families[i] = make_family(kFamilyTables[i]);
+    return *families[i];
+  }
+  throw Error("unknown marker family \"" + name + "\"; near names: " + near_names(name) + " (of " +
+              std::to_string(kFamilyCount) + " families)");
+}
+
+}  // namespace berth
