@@ -1,0 +1,39 @@
+#include <filesystem>
+
+#include "berth/error.hpp"
+#include "camera/image_file.hpp"
+#include "camera/sources.hpp"
+#include "sim/scenario.hpp"
+
+namespace berth {
+namespace {
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+}  // namespace
+
+std::unique_ptr<Source> open_source(const std::string& spec) {
+  const std::size_t colon = spec.find(':');
+  const std::string kind = colon == std::string::npos ? "" : spec.substr(0, colon);
+  const std::string rest = colon == std::string::npos ? "" : spec.substr(colon + 1);
+  if (kind == "sim") return open_scenario(rest);
+  if (kind == "dir") return open_images(list_images(rest, false));
+  if (kind == "file") return open_images({rest});
+  if (kind == "video") return open_video(rest);
+
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(spec, error);
+  if (!std::filesystem::exists(status)) {
+    throw Error(spec +
+                ": there is no such file or folder; give a path, or a source as sim:FILE, dir:DIR, file:IMAGE or "
+                "video:FILE");
+  }
+  if (std::filesystem::is_directory(status)) return open_images(list_images(spec, false));
+  if (ends_with(spec, ".toml")) return open_scenario(spec);
+  if (has_image_name(spec)) return open_images({spec});
+  return open_video(spec);
+}
+
+}  // namespace berth
