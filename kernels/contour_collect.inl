@@ -1,0 +1,66 @@
+// Lists the kept contours in raster order of their first top, with the row they begin in and a place for their points.
+// Past a capacity the first ones stay; slots without a contour get 0 nodes. The header tells what was needed.
+KERNEL(contour_collect)
+IN(0, u32, spans)
+IN(1, u32, offsets)
+OUT(2, u32, contours)    // [CONTOUR_HEADER + max_contours * CONTOUR_WORDS]: see ops.h
+PARAMS(contour_collect)
+SHARED(u32, ranks, 128)
+SHARED(u32, starts, 128)
+BODY
+  EACH_ITEM
+    ranks[LID] = GROUP < p.groups ? spans[GID] : 0u;
+  EACH_END
+  EACH_ITEM
+    if (LID == 0 && GROUP < p.groups) {
+      u32 rank = spans[p.totals_at + GROUP];
+      u32 start = spans[p.totals_at + p.groups + 1 + GROUP];
+      for (int i = 0; i < GROUP_SIZE; ++i) {
+        const u32 span = ranks[i];
+        ranks[i] = rank;
+        starts[i] = start;
+        if (span != 0u) {
+          rank += 1u;
+          start += span & ~CONTOUR_HOLE;
+        }
+      }
+    }
+  EACH_END
+  EACH_ITEM
+    const u32 needed = spans[p.totals_at + p.groups];
+    if (GROUP < p.groups) {
+      const u32 span = spans[GID];
+      if (span != 0u && ranks[LID] < U32(p.max_contours)) {
+        const u32 id = U32(GID) * 2u;
+        int low = 0;  // the row whose run ends hold id
+        int high = p.height;
+        while (high - low > 1) {
+          const int middle = (low + high) / 2;
+          if (RUN_ENDS_BEFORE(middle * p.row_words) <= id) {
+            low = middle;
+          } else {
+            high = middle;
+          }
+        }
+        const bool fits = starts[LID] + (span & ~CONTOUR_HOLE) <= U32(p.max_points);
+        const int record = CONTOUR_HEADER + S32(ranks[LID]) * CONTOUR_WORDS;
+        contours[record] = id;
+        contours[record + 1] = fits ? span : 0u;
+        contours[record + 2] = U32(low);
+        contours[record + 3] = starts[LID];
+      }
+    }
+    if (GID >= S32(min(needed, U32(p.max_contours))) && GID < p.max_contours) {
+      const int record = CONTOUR_HEADER + GID * CONTOUR_WORDS;
+      contours[record] = 0u;
+      contours[record + 1] = 0u;
+      contours[record + 2] = 0u;
+      contours[record + 3] = 0u;
+    }
+    if (GID == 0) {
+      contours[0] = RUN_ENDS_BEFORE(p.height * p.row_words);
+      contours[1] = needed;
+      contours[2] = spans[p.totals_at + p.groups + 1 + p.groups];
+    }
+  EACH_END
+END

@@ -1,0 +1,72 @@
+// Adaptive threshold. Around each tile, over 3 × 3 tiles (fewer at the border), the middle of the darkest and the
+// lightest pixel parts black from white; where they differ by less than the contrast, a pixel is neither ("don't
+// care") and, like white, not set. An item makes 32 × 4 pixels: a word of each of four rows.
+// Source: the tile threshold of AprilTag 3 (Wang & Olson 2016); SWAR per Warren, Hacker's Delight.
+KERNEL(threshold)
+IN(0, u32, pixels)    // [tile_rows * 4, row_words * 8]
+IN(1, u32, minima)    // [tile_rows, row_words * 2]
+IN(2, u32, maxima)
+IN(3, u32, levels)    // [4]
+OUT(4, u32, bits)     // [height, row_words]
+PARAMS(threshold)
+BODY
+  EACH_ITEM
+    if (GID < p.tile_rows * p.row_words) {
+      const int tile_y = GID / p.row_words;
+      const int word_x = GID % p.row_words;
+      const int stride = p.row_words * 2;
+      const int above = max(tile_y - 1, 0) * stride;
+      const int here = tile_y * stride;
+      const int below = min(tile_y + 1, p.tile_rows - 1) * stride;
+      const u32 contrast = levels[3] * 0x01010101u;
+      u32 row0 = 0u;
+      u32 row1 = 0u;
+      u32 row2 = 0u;
+      u32 row3 = 0u;
+      for (int half = 0; half < 2; ++half) {
+        const int x = word_x * 2 + half;
+        const int left = max(x - 1, 0);
+        const int right = min(x + 1, stride - 1);
+        // Columns first: the extrema of three tiles, for this word and its neighbours.
+        u32 low = bytes_min(bytes_min(minima[above + x], minima[here + x]), minima[below + x]);
+        u32 high = bytes_max(bytes_max(maxima[above + x], maxima[here + x]), maxima[below + x]);
+        u32 low_left = bytes_min(bytes_min(minima[above + left], minima[here + left]), minima[below + left]) >> 24;
+        u32 high_left = bytes_max(bytes_max(maxima[above + left], maxima[here + left]), maxima[below + left]) >> 24;
+        u32 low_right = bytes_min(bytes_min(minima[above + right], minima[here + right]), minima[below + right]) << 24;
+        u32 high_right = bytes_max(bytes_max(maxima[above + right], maxima[here + right]), maxima[below + right]) << 24;
+        if (left == x) {  // at the border the outermost tile stands in for the missing one
+          low_left = low & 255u;
+          high_left = high & 255u;
+        }
+        if (right == x) {
+          low_right = low & 0xff000000u;
+          high_right = high & 0xff000000u;
+        }
+        low = bytes_min(low, bytes_min((low << 8) | low_left, (low >> 8) | low_right));
+        high = bytes_max(high, bytes_max((high << 8) | high_left, (high >> 8) | high_right));
+        const u32 middle = (low & high) + (((low ^ high) & 0xfefefefeu) >> 1);  // per byte floor((low + high) / 2)
+        const u32 judged = bytes_ge(high - low, contrast) * 255u;              // high >= low: no borrow
+        const int first = tile_y * 4 * p.row_words * 8 + x * 4;
+        for (int k = 0; k < 4; ++k) {
+          if (((judged >> (8 * k)) & 1u) != 0u) {
+            const u32 limit = ((middle >> (8 * k)) & 255u) * 0x01010101u;
+            const int at = 16 * half + 4 * k;
+            // The multiplication gathers the four flag bits in the top nibble, leftmost pixel lowest.
+            row0 |= ((bytes_ge(limit, pixels[first + k]) * 0x10204080u) >> 28) << at;
+            row1 |= ((bytes_ge(limit, pixels[first + k + p.row_words * 8]) * 0x10204080u) >> 28) << at;
+            row2 |= ((bytes_ge(limit, pixels[first + k + p.row_words * 16]) * 0x10204080u) >> 28) << at;
+            row3 |= ((bytes_ge(limit, pixels[first + k + p.row_words * 24]) * 0x10204080u) >> 28) << at;
+          }
+        }
+      }
+      const int columns = p.width - word_x * 32;
+      const u32 inside = columns >= 32 ? 0xffffffffu : columns <= 0 ? 0u : (1u << columns) - 1u;
+      const int y = tile_y * 4;
+      const int word = y * p.row_words + word_x;
+      if (y < p.height) bits[word] = row0 & inside;
+      if (y + 1 < p.height) bits[word + p.row_words] = row1 & inside;
+      if (y + 2 < p.height) bits[word + p.row_words * 2] = row2 & inside;
+      if (y + 3 < p.height) bits[word + p.row_words * 3] = row3 & inside;
+    }
+  EACH_END
+END
