@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "berth/image.hpp"
@@ -23,15 +24,19 @@ struct QuadCandidate {
 /// Reads the code inside quadrilaterals.
 class Decoder {
  public:
-  Decoder(std::vector<const MarkerFamily*> families, int max_hamming);
+  /// `max_hamming`: see DetectorConfig. Throws Error on a negative one. The families outlive the decoder.
+  Decoder(const std::vector<const MarkerFamily*>& families, int max_hamming);
+  ~Decoder();
+  Decoder(Decoder&&) noexcept;
+  Decoder& operator=(Decoder&&) noexcept;
 
   /// Tries the fine corners, then the coarse ones. Returns whether a code of a family was read into `detection`,
-  /// whose corners are then the fine ones in the paper's order.
+  /// whose corners are then the fine ones in the paper's order. Allocates nothing.
   bool decode(View2D<const u8> image, const QuadCandidate& quad, Detection& detection) const;
 
  private:
-  struct Table;
-  std::vector<Table> tables_;
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
 };
 
 /// Of detections that cover the same place keeps the best (Hamming distance, margin, area, then position: a total

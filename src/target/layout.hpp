@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "berth/marker.hpp"
+
+namespace berth {
+
+/// Most data bits a family may have: a code is one u64.
+constexpr int kMaxCells = 64;
+
+/// A place to sample, in modules from the border's upper left.
+struct RingPoint {
+  double u, v;
+  bool light;
+};
+
+/// Where a group of families has its border and its data, whatever the codes.
+struct Layout {
+  /// What lies beside a data cell: a data cell (its index), or one of these.
+  enum Neighbour : int { kDark = -1, kLight = -2, kUnknown = -3 };
+
+  explicit Layout(const MarkerFamily& family);
+  /// Whether the family's data cells are these, in any order.
+  bool fits(const MarkerFamily& family) const;
+  /// The cell at column x, row y; -1 where there is none.
+  int cell_at(int x, int y) const;
+
+  int border_width = 0;
+  bool reversed_border = false;
+  /// How far anything sampled reaches outside the border, modules.
+  double reach = 0;
+  /// Column and row of each data cell, row by row.
+  std::vector<int> x, y;
+  /// The eight neighbours of each cell, row by row without the cell itself: [cells][8].
+  std::vector<int> neighbours;
+  /// The border's dark and light rings, one point a module.
+  std::vector<RingPoint> ring;
+  /// Sixteen of them, enough to tell most quadrilaterals from a marker.
+  std::vector<RingPoint> probe;
+};
+
+}  // namespace berth
