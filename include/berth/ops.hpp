@@ -17,7 +17,7 @@ enum class Op : int {
 };
 
 /// Element type of a device buffer argument.
-enum class Elem { u32, s32 };
+enum class Elem { unsigned32, signed32 };
 
 /// One buffer argument of an operation, as deduced from the reference's signature.
 struct Arg {

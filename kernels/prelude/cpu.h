@@ -3,7 +3,7 @@
 #define GROUP_SIZE 128
 
 #define FN static inline
-#define KERNEL(name) static void name(const int group_,
+#define KERNEL(name) static void name([[maybe_unused]] const int group_,
 #define IN(i, T, x) const T* x,
 #define OUT(i, T, x) T* x,
 #define INOUT(i, T, x) T* x,

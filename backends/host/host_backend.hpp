@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "berth/backend.hpp"
+
+namespace berth::host {
+
+/// Runs groups [first, last) of an operation on host memory. Calls for different groups may run at the same time.
+using RunGroups = void (*)(const void* params, void* const* buffers, int first, int last);
+
+/// How one operation runs on this backend.
+struct HostOp {
+  RunGroups run = nullptr;
+  /// The function does the whole operation when called for group 0; it is called once.
+  bool whole = false;
+};
+
+/// A table of operations by Op, filled by a CPU backend.
+struct HostOps {
+  HostOp ops[32];
+};
+
+/// A backend whose buffers are host memory and whose operations are functions; work is done while it is enqueued.
+/// `threads` share an operation's groups (0: every core).
+std::unique_ptr<Backend> make_host_backend(const char* name, DeviceInfo device, const HostOps& ops, int threads);
+
+/// Name of this machine's processor.
+std::string processor_name();
+
+}  // namespace berth::host

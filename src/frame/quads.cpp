@@ -1,0 +1,70 @@
+#include "frame/quads.hpp"
+
+#include <array>
+#include <utility>
+
+#include "berth/ops.hpp"
+
+namespace berth {
+namespace {
+
+/// a x + b y = c in pixels whose centres are at integers.
+struct Line {
+  double a, b, c;
+};
+
+// Words are half pixels from the image's corner: u in halves, v in 1/512 px, slope q14.
+Line to_line(bool upright, double u_ref, double v_ref, double slope_q14) {
+  const double u = u_ref / 2 - 0.5;
+  const double v = v_ref / 512 - 0.5;
+  const double slope = slope_q14 / 16384;
+  // v' = v + slope (u' - u); upright sides have x as v.
+  return upright ? Line{1, -slope, v - slope * u} : Line{-slope, 1, v - slope * u};
+}
+
+bool intersect(const Line& p, const Line& q, std::array<double, 2>& point) {
+  const double determinant = p.a * q.b - q.a * p.b;
+  if (determinant < 1e-3 && determinant > -1e-3) return false;
+  point = {(p.c * q.b - q.c * p.b) / determinant, (p.a * q.c - q.a * p.c) / determinant};
+  return true;
+}
+
+bool corners_of(const std::array<Line, 4>& lines, std::array<std::array<double, 2>, 4>& corners) {
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (!intersect(lines[(k + 3) % 4], lines[k], corners[k])) return false;
+  }
+  return true;
+}
+
+// A refined side counts when this many stations saw an edge.
+constexpr int kMinStations = 4;
+
+}  // namespace
+
+bool to_candidate(const s32* quad, const s32* edge, QuadCandidate& candidate) {
+  candidate.reversed_border = (quad[0] & QUAD_HOLE) != 0;
+  candidate.has_fine = true;
+  std::array<Line, 4> coarse{};
+  std::array<Line, 4> fine{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const s32* side = quad + QUAD_SIDE + k * QUAD_SIDE_WORDS;
+    const s32* refined = edge + k * EDGE_SIDE_WORDS;
+    const bool upright = side[0] % 2 == 0;
+    const double u_ref = side[0] / 2;
+    coarse[k] = to_line(upright, u_ref, side[1], side[2]);
+    fine[k] = to_line(upright, u_ref, refined[0], refined[1]);
+    if (refined[2] < kMinStations) candidate.has_fine = false;
+  }
+  if (!corners_of(coarse, candidate.coarse)) return false;
+  if (!candidate.has_fine || !corners_of(fine, candidate.fine)) {
+    candidate.has_fine = false;
+    candidate.fine = candidate.coarse;
+  }
+  if (candidate.reversed_border) {  // a hole is walked counter-clockwise
+    std::swap(candidate.coarse[1], candidate.coarse[3]);
+    std::swap(candidate.fine[1], candidate.fine[3]);
+  }
+  return true;
+}
+
+}  // namespace berth

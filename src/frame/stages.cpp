@@ -1,0 +1,53 @@
+#include "frame/stages.hpp"
+
+#include <algorithm>
+
+namespace berth {
+
+StageReader::StageReader(MarkerPlan& plan, Stream& stream) : plan_(plan), stream_(stream) {
+  fetch(plan.contours(), contours_);
+  fetch(plan.quads(), quads_);
+}
+
+std::size_t StageReader::fetch(Buffer& buffer, std::vector<u32>& words) {
+  words.resize(buffer.bytes() / 4);
+  stream_.download(buffer, words.data(), buffer.bytes());
+  stream_.finish();
+  return words.size();
+}
+
+const std::vector<u32>& StageReader::read(std::size_t index) {
+  const Stage& stage = plan_.stages()[index];
+  const std::size_t slots = static_cast<std::size_t>(plan_.geometry().max_contours);
+  const std::size_t size = fetch(*stage.buffer, words_);
+  switch (stage.length) {
+    case Stage::Length::whole:
+      break;
+    case Stage::Length::run_ends:  // in overflow the last rows are missing, which the offsets' stage shows
+      words_.resize(contours_[0] <= size ? contours_[0] : 0);
+      break;
+    case Stage::Length::points: {
+      std::size_t used = 0;
+      for (std::size_t i = 0; i < slots; ++i) {
+        const u32* record = contours_.data() + CONTOUR_HEADER + i * CONTOUR_WORDS;
+        const std::size_t nodes = record[1] & ~CONTOUR_HOLE;
+        if (nodes > 0) used = std::max(used, record[3] + nodes);
+      }
+      words_.resize(std::min(size, used));
+      break;
+    }
+    case Stage::Length::quads:
+    case Stage::Length::edges: {
+      const bool quads = stage.length == Stage::Length::quads;
+      const std::size_t width = quads ? QUAD_WORDS : EDGE_WORDS;
+      for (std::size_t i = 0; i < slots; ++i) {
+        if (quads_[i * QUAD_WORDS] != 0) continue;
+        std::fill_n(words_.begin() + static_cast<std::ptrdiff_t>(i * width), width, 0u);
+      }
+      break;
+    }
+  }
+  return words_;
+}
+
+}  // namespace berth
