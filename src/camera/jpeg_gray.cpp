@@ -1,12 +1,12 @@
 // libjpeg itself rather than OpenCV's wrapper: the wrapper drops libjpeg's warnings, and a file cut in the middle would
 // pass as an image whose lower half is gray. It also gives the stored luma without a round trip through colour.
-#include <jpeglib.h>
-
 #include <csetjmp>
 #include <cstdio>
-#include <cstring>
-// after jpeglib.h
+// jpeglib.h needs <cstdio> before it and jerror.h after it.
+// clang-format off
+#include <jpeglib.h>
 #include <jerror.h>
+// clang-format on
 
 #include "camera/bad_input.hpp"
 #include "camera/decoders.hpp"

@@ -1,0 +1,179 @@
+// berth detect: markers in image files.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <set>
+
+#include "annotate.hpp"
+#include "berth/error.hpp"
+#include "camera/bad_input.hpp"
+#include "camera/image_file.hpp"
+#include "commands.hpp"
+#include "engine.hpp"
+#include "frame_json.hpp"
+
+namespace berth::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExamples = R"(Examples:
+  berth detect photo.jpg
+  berth detect --json photos/ more/*.png > markers.jsonl
+  berth detect --family tag36h11,aruco4x4_50 --draw seen.png photo.jpg
+  berth detect --camera cam.yaml --size 0.08 --draw annotated/ photos/
+
+Corners start at the upper left of the upright marker and go counter-clockwise; pixel centres lie at integers.)";
+
+struct DetectOptions {
+  std::vector<std::string> images;
+  EngineOptions engine;
+  bool json = false;
+  bool recursive = false;
+  std::string draw;
+};
+
+/// Every image file named, folders expanded. A folder that cannot be listed is complained about and left out.
+std::vector<std::string> expand(const DetectOptions& options, Console& console) {
+  std::vector<std::string> paths;
+  for (const std::string& image : options.images) {
+    std::error_code ignored;
+    if (!fs::is_directory(image, ignored)) {
+      paths.push_back(image);
+      continue;
+    }
+    try {
+      for (std::string& path : list_images(image, options.recursive)) paths.push_back(std::move(path));
+    } catch (const Error& error) {
+      console.complain(error.what());
+    }
+  }
+  return paths;
+}
+
+/// Where annotated pictures go: one file, or a folder with one PNG for each image.
+class DrawTarget {
+ public:
+  DrawTarget(const std::string& out, std::size_t images) : out_(out) {
+    if (out_.empty()) return;
+    std::error_code error;
+    const std::string ending = fs::path(out_).extension().string();
+    is_file_ = (ending == ".png" || ending == ".PNG") && !fs::is_directory(out_, error);
+    if (is_file_ && images > 1) {
+      throw bad_field("command line", "--draw", "'" + out_ + "'",
+                      "one file cannot hold " + std::to_string(images) + " pictures, name a folder");
+    }
+    if (is_file_) return;
+    fs::create_directories(out_, error);
+    if (error) {
+      throw bad_field("command line", "--draw", "'" + out_ + "'",
+                      "the folder cannot be made (" + error.message() + "), name another");
+    }
+  }
+
+  bool wanted() const { return !out_.empty(); }
+
+  /// The picture's file for an image: its name with .png, made unique within this run by a number.
+  std::string path_for(const std::string& image) {
+    if (is_file_) return out_;
+    const std::string stem = fs::path(image).stem().string();
+    std::string name = stem + ".png";
+    for (int n = 2; !used_.insert(name).second; ++n) name = stem + "_" + std::to_string(n) + ".png";
+    return (fs::path(out_) / name).string();
+  }
+
+ private:
+  std::string out_;
+  bool is_file_ = false;
+  std::set<std::string> used_;
+};
+
+void print_table(Console& console, const std::string& image, const TimedResult& result) {
+  const std::vector<Detection>& detections = result.frame.detections;
+  console.out() << fmt::format("{}: {} marker{}, {:.3f} ms\n", image, detections.size(),
+                               detections.size() == 1 ? "" : "s", ms_of(result.cpu_ns));
+  for (const Detection& d : detections) {
+    console.out() << fmt::format("  {:<18} {:>4}  hamming {}  margin {:5.1f}  corner 1 ({:.2f}, {:.2f})",
+                                 d.family->name, d.id, d.hamming, d.margin, d.corners[0][0], d.corners[0][1]);
+    if (d.has_pose) {
+      const std::array<double, 3>& t = d.pose.t;
+      console.out() << fmt::format("  t ({:.4f}, {:.4f}, {:.4f}) m, range {:.4f} m", t[0], t[1], t[2],
+                                   std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]));
+    }
+    console.out() << '\n';
+  }
+}
+
+void warn_of_overflow(Console& console, const std::string& image, const FrameResult& frame) {
+  if (frame.status != FrameStatus::overflow) return;
+  for (const CapacityUse& use : frame.capacities) {
+    if (use.needed <= use.capacity) continue;
+    console.note(image + ": field '" + use.what + "' is " + std::to_string(use.needed) + ", above the capacity of " +
+                 std::to_string(use.capacity) + ": markers may be missing; use a cleaner or smaller image");
+  }
+}
+
+void detect_one(const std::string& path, const DetectOptions& options, Engine& engine, DrawTarget& draw,
+                Console& console) {
+  const GrayImage image = read_gray_image(path);
+  const TimedResult result = engine.detect(image.view(), {});
+  if (result.frame.status == FrameStatus::device_lost) {
+    throw Error(path + ": the device was lost during the frame; see berth doctor, or use --backend simd");
+  }
+  warn_of_overflow(console, path, result.frame);
+  if (options.json) {
+    console.out() << to_line({{"image", path},
+                              {"ms", ms_of(result.cpu_ns)},
+                              {"detections", to_json(result.frame.detections)}})
+                  << '\n';
+  } else {
+    print_table(console, path, result);
+  }
+  const std::string refusal = engine.pose_refusal(image.width(), image.height());
+  if (!refusal.empty()) console.complain(path + ": " + refusal + " (" + options.engine.camera_file + ")");
+  if (draw.wanted()) {
+    write_annotated(draw.path_for(path), image.view(), result.frame.detections, engine.config().camera,
+                    engine.config().marker_size_m);
+  }
+}
+
+void run_detect(const DetectOptions& options, Console& console) {
+  DetectorConfig config = make_config(options.engine);
+  if (options.engine.camera_file.empty() != options.engine.size.empty()) {
+    console.note(std::string("no poses: ") + (options.engine.size.empty() ? "--size" : "--camera") + " is missing");
+  }
+  const std::vector<std::string> paths = expand(options, console);
+  DrawTarget draw(options.draw, paths.size());
+  Engine engine(open_chosen_backend(options.engine), std::move(config));
+  for (const std::string& path : paths) {
+    try {
+      detect_one(path, options, engine, draw, console);
+    } catch (const Error& error) {
+      console.complain(error.what());
+    } catch (const std::bad_alloc&) {
+      console.complain(path + ": out of memory; use a smaller image");
+    }
+  }
+}
+
+}  // namespace
+
+void add_detect(CLI::App& app, Console& console, int& exit_code) {
+  CLI::App* command = app.add_subcommand("detect", "Find markers in image files");
+  const auto options = std::make_shared<DetectOptions>();
+  command->add_option("IMAGE", options->images, "PNG, JPEG or PNM files, or folders of them")->required();
+  command->add_flag("--json", options->json, "one JSON line for each image on standard output, and nothing else there");
+  command->add_flag("-r,--recursive", options->recursive, "folders with their subfolders");
+  command->add_option("--draw", options->draw, "write annotated PNGs: a .png file for one image, or a folder")
+      ->type_name("OUT");
+  add_engine_options(*command, options->engine);
+  command->footer(kExamples);
+  command->callback([options, &console, &exit_code] {
+    run_detect(*options, console);
+    exit_code = kOk;
+  });
+}
+
+}  // namespace berth::cli

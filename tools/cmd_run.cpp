@@ -1,0 +1,49 @@
+// berth run: markers in a stream of frames.
+#include <memory>
+
+#include "camera/sources.hpp"
+#include "commands.hpp"
+#include "stream.hpp"
+
+namespace berth::cli {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  berth run --source sim:scenarios/approach.toml
+  berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
+  berth run --source dir:recording/ --json - | jq .detections
+  berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
+
+Ctrl-C ends the stream cleanly, with its summary.)";
+
+}  // namespace
+
+void add_run(CLI::App& app, Console& console, int& exit_code) {
+  struct Options {
+    std::string source;
+    StreamOptions stream;
+  };
+  CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image or video");
+  const auto options = std::make_shared<Options>();
+  command
+      ->add_option("--source", options->source,
+                   "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, or a path from which that is told")
+      ->type_name("SOURCE")
+      ->required();
+  command->add_option("--json", options->stream.log, "log: one JSON line a frame; - for standard output")
+      ->type_name("FILE");
+  command->add_option("--svg", options->stream.svg, "drawing of the trajectory")->type_name("FILE");
+  command->add_flag("--digests", options->stream.digests, "log a digest of every stage's output (slow)");
+  command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
+      ->type_name("N")
+      ->capture_default_str();
+  add_engine_options(*command, options->stream.engine);
+  command->footer(kExamples);
+  command->callback([options, &console, &exit_code] {
+    const std::unique_ptr<Source> source = open_source(options->source);
+    run_stream(*source, options->stream, console);
+    exit_code = kOk;
+  });
+}
+
+}  // namespace berth::cli

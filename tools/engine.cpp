@@ -1,0 +1,163 @@
+#include "engine.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <locale>
+#include <sstream>
+
+#include "berth/error.hpp"
+#include "camera/bad_input.hpp"
+
+namespace berth::cli {
+namespace {
+
+constexpr const char* kCommandLine = "command line";
+
+/// Detectors kept at a time: a folder of a few sizes warms each up once, and a folder of many does not fill the memory.
+constexpr std::size_t kDetectorsKept = 4;
+
+std::int64_t process_cpu_ns() {
+  timespec now = {};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return std::int64_t{now.tv_sec} * 1000000000 + now.tv_nsec;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string all;
+  for (const std::string& word : words) all += (all.empty() ? "" : ", ") + word;
+  return all;
+}
+
+}  // namespace
+
+void add_backend_options(CLI::App& command, EngineOptions& options) {
+  command.add_option("--backend", options.backend, "simd, cpu, opencl or reference; default: the first that opens")
+      ->type_name("NAME");
+  command.add_option("--device", options.device, "the backend's device, by index or by a part of its name")
+      ->type_name("DEVICE");
+  command.add_option("--threads", options.threads, "threads of the CPU backends, 0 for every core")
+      ->type_name("N")
+      ->capture_default_str();
+}
+
+void add_engine_options(CLI::App& command, EngineOptions& options) {
+  // allow_extra_args(false): "--family tag36h11 a.png" must not take a.png for a family.
+  command
+      .add_option("--family", options.families,
+                  "marker family; may be repeated or a comma list; 'all' for every built-in one [tag36h11]")
+      ->type_name("NAME")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command.add_option("--camera", options.camera_file, "camera_info YAML; with --size, markers get a pose")
+      ->type_name("FILE");
+  command.add_option("--size", options.size, "side of the marker's border square, metres")->type_name("METRES");
+  command.add_option("--max-hamming", options.max_hamming, "most wrong bits a code may have")
+      ->type_name("N")
+      ->capture_default_str();
+  add_backend_options(command, options);
+}
+
+std::unique_ptr<Backend> open_chosen_backend(const EngineOptions& options) {
+  if (options.threads < 0) {
+    throw bad_field(kCommandLine, "--threads", std::to_string(options.threads), "give 0 for every core, or 1 or more");
+  }
+  BackendOptions backend_options;
+  backend_options.device = options.device;
+  backend_options.threads = options.threads;
+  const std::vector<std::string>& names = backend_names();
+  if (!options.backend.empty()) {
+    if (std::find(names.begin(), names.end(), options.backend) == names.end()) {
+      throw bad_field(kCommandLine, "--backend", "'" + options.backend + "'",
+                      "this build has no such backend, use one of " + joined(names));
+    }
+    return open_backend(options.backend, backend_options);
+  }
+  std::string reasons;
+  for (const std::string& name : names) {
+    try {
+      return open_backend(name, backend_options);
+    } catch (const Error& error) {
+      reasons += "\n  " + name + ": " + error.what();
+    }
+  }
+  throw Error("no backend opens; see berth doctor" + reasons);
+}
+
+double parse_size(const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double size_m = 0;
+  stream >> size_m;
+  // The upper bound catches a size in millimetres before it becomes a pose a thousand times too far away.
+  if (stream.fail() || !stream.eof() || !std::isfinite(size_m) || !(size_m > 0) || size_m > 1000) {
+    throw bad_field(
+        kCommandLine, "--size", "'" + text + "'",
+        "give the side of the marker's border square in metres, above 0 and at most 1000, e.g. --size 0.08");
+  }
+  return size_m;
+}
+
+DetectorConfig make_config(const EngineOptions& options) {
+  DetectorConfig config;
+  if (!options.families.empty()) config.families = options.families;
+  if (config.families == std::vector<std::string>{"all"}) config.families = family_names();
+  for (const std::string& name : config.families) {
+    try {
+      family(name);
+    } catch (const Error& error) {
+      throw bad_field(kCommandLine, "--family", "'" + name + "'", error.what());
+    }
+  }
+  if (options.max_hamming < 0 || options.max_hamming > 16) {
+    throw bad_field(kCommandLine, "--max-hamming", std::to_string(options.max_hamming), "give 0…16, usually 2");
+  }
+  config.max_hamming = options.max_hamming;
+  if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
+  if (!options.camera_file.empty()) config.camera = read_camera_info(options.camera_file);
+  return config;
+}
+
+Engine::Engine(std::unique_ptr<Backend> backend, DetectorConfig config)
+    : backend_(std::move(backend)), config_(std::move(config)) {}
+
+std::string Engine::pose_refusal(int width, int height) const {
+  if (!config_.camera || !(config_.marker_size_m > 0)) return "";
+  if (config_.camera->width == width && config_.camera->height == height) return "";
+  const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
+  return "field 'size' is " + size(width, height) + ", but the camera file's image is " +
+         size(config_.camera->width, config_.camera->height) +
+         ": no pose; use images as the camera was calibrated, or a camera file for this size";
+}
+
+Detector& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
+  const auto known = std::find_if(detectors_.begin(), detectors_.end(), [&](const Sized& sized) {
+    return sized.width == image.width && sized.height == image.height;
+  });
+  if (known != detectors_.end()) {
+    std::rotate(detectors_.begin(), known, known + 1);
+    return detectors_.front().detector;
+  }
+  if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
+  DetectorConfig config = config_;
+  if (!pose_refusal(image.width, image.height).empty()) config.camera.reset();
+  detectors_.insert(detectors_.begin(),
+                    {image.width, image.height, Detector(*backend_, image.width, image.height, config)});
+  detectors_.front().detector.detect(image, stamp);
+  return detectors_.front().detector;
+}
+
+TimedResult Engine::detect(View2D<const u8> image, const FrameStamp& stamp) {
+  Detector& detector = detector_for(image, stamp);
+  const auto wall_start = std::chrono::steady_clock::now();
+  const std::int64_t cpu_start = process_cpu_ns();
+  detector.submit(image, stamp);
+  const FrameResult& frame = detector.collect();
+  const std::int64_t cpu_ns = process_cpu_ns() - cpu_start;
+  const auto wall = std::chrono::steady_clock::now() - wall_start;
+  return {frame, cpu_ns, std::chrono::duration_cast<std::chrono::nanoseconds>(wall).count()};
+}
+
+}  // namespace berth::cli

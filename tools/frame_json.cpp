@@ -1,0 +1,59 @@
+#include "frame_json.hpp"
+
+#include <fmt/format.h>
+
+namespace berth::cli {
+namespace {
+
+Json to_json(const Pose& pose) { return {{"R", pose.R}, {"t", pose.t}}; }
+
+}  // namespace
+
+Json to_json(const Detection& detection) {
+  Json json = {{"family", detection.family->name}, {"id", detection.id},           {"hamming", detection.hamming},
+               {"margin", detection.margin},       {"corners", detection.corners}, {"center", detection.center}};
+  if (detection.has_pose) json["pose"] = to_json(detection.pose);
+  return json;
+}
+
+Json to_json(const std::vector<Detection>& detections) {
+  Json json = Json::array();
+  for (const Detection& detection : detections) json.push_back(to_json(detection));
+  return json;
+}
+
+Json to_json(const TruthMarker& marker) {
+  return {{"family", marker.family},   {"id", marker.id},           {"size", marker.size_m},
+          {"visible", marker.visible}, {"corners", marker.corners}, {"pose", to_json(marker.pose)}};
+}
+
+Json to_json(const FrameResult& frame, const std::string& label, std::int64_t cpu_ns,
+             const std::vector<TruthMarker>& truth) {
+  Json times = Json::object();
+  for (const StageTime& time : frame.times) {
+    if (time.stage[0] != '\0') times[time.stage] = static_cast<double>(time.ns) / 1e3;
+  }
+  Json json = {{"frame", frame.stamp.sequence},
+               {"label", label},
+               {"clock", frame.stamp.clock},
+               {"mid_exposure_ns", frame.stamp.mid_exposure_ns},
+               {"status", name_of(frame.status)},
+               {"ms", ms_of(cpu_ns)},
+               {"stages_us", times},
+               {"quads", frame.quads},
+               {"detections", to_json(frame.detections)}};
+  if (frame.status == FrameStatus::overflow) {
+    for (const CapacityUse& use : frame.capacities) {
+      json["capacities"][use.what] = {{"needed", use.needed}, {"capacity", use.capacity}};
+    }
+  }
+  if (!truth.empty()) {
+    for (const TruthMarker& marker : truth) json["truth"].push_back(to_json(marker));
+  }
+  for (const StageDigest& digest : frame.digests) json["digests"][digest.stage] = fmt::format("{:016x}", digest.digest);
+  return json;
+}
+
+std::string to_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+}  // namespace berth::cli

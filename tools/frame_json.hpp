@@ -1,0 +1,29 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "berth/frame.hpp"
+#include "berth/source.hpp"
+
+namespace berth::cli {
+
+using Json = nlohmann::ordered_json;
+
+/// {"family","id","hamming","margin","corners","center","pose"?}: docs/command.md.
+Json to_json(const Detection& detection);
+Json to_json(const std::vector<Detection>& detections);
+Json to_json(const TruthMarker& marker);
+
+/// One frame of a stream's log. `label` names the frame in its source; truth and digests only where there are any.
+Json to_json(const FrameResult& frame, const std::string& label, std::int64_t cpu_ns,
+             const std::vector<TruthMarker>& truth);
+
+/// One line without its end. Doubles read back equal; bytes that are no UTF-8 become U+FFFD.
+std::string to_line(const Json& json);
+
+/// Nanoseconds as milliseconds.
+inline double ms_of(std::int64_t ns) { return static_cast<double>(ns) / 1e6; }
+
+}  // namespace berth::cli

@@ -1,0 +1,52 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+
+#include "berth/error.hpp"
+#include "commands.hpp"
+
+namespace berth::cli {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  berth demo                                     a simulated approach, start to docked
+  berth detect photo.jpg                         the markers in a photo, as a table
+  berth detect --json --family tag36h11 photos/  the same for a folder, as JSON lines
+  berth run --source video:approach.mp4 --camera cam.yaml --size 0.08
+  berth verify                                   every backend against the reference, bit by bit
+  berth doctor                                   what this machine has, and what it lacks
+
+Exit codes: 0 all well; 1 verify found a difference, or a demo found nothing; 2 bad input or usage.)";
+
+}  // namespace
+
+int run_command(int argc, const char* const* argv, Console& console) {
+  CLI::App app("Docking vision: marker frames in, 6-DOF poses out, with the same bits on every machine.", "berth");
+  app.footer(kExamples);
+  app.set_version_flag("--version", "berth " BERTH_VERSION);
+  app.require_subcommand(1);
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    return "berth: command line: " + std::string(error.what()) + "; see " + failed->get_display_name() + " --help\n";
+  });
+  int exit_code = kOk;
+  add_demo(app, console, exit_code);
+  add_detect(app, console, exit_code);
+  add_run(app, console, exit_code);
+  add_verify(app, console, exit_code);
+  add_doctor(app, console, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, console.out(), console.err()) == 0 ? kOk : kBadInput;
+  } catch (const Error& error) {
+    console.complain(error.what());
+  } catch (const std::bad_alloc&) {
+    console.complain("out of memory; use smaller images or fewer at a time");
+  } catch (const std::exception& error) {
+    console.complain(std::string("unexpected: ") + error.what());
+  }
+  console.out().flush();
+  if (!console.out()) console.complain("standard output: writing failed; check the disk or the pipe");
+  return console.complained() ? static_cast<int>(kBadInput) : exit_code;
+}
+
+}  // namespace berth::cli

@@ -1,0 +1,264 @@
+#include "stream.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "annotate.hpp"
+#include "berth/error.hpp"
+#include "frame_json.hpp"
+#include "live_view.hpp"
+#include "trajectory_svg.hpp"
+#include "truth_score.hpp"
+
+namespace berth::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+/// While it lives, the first SIGINT asks the stream to end; a second one has its usual effect.
+class InterruptWatch {
+ public:
+  InterruptWatch() {
+    interrupted = 0;
+    previous_ = std::signal(SIGINT, [](int) {
+      interrupted = 1;
+      std::signal(SIGINT, SIG_DFL);
+    });
+  }
+  ~InterruptWatch() { std::signal(SIGINT, previous_); }
+  InterruptWatch(const InterruptWatch&) = delete;
+  InterruptWatch& operator=(const InterruptWatch&) = delete;
+  bool came() const { return interrupted != 0; }
+
+ private:
+  void (*previous_)(int);
+};
+
+using MarkerKey = std::pair<std::string, int>;
+
+class Stream {
+ public:
+  Stream(Source& source, const StreamOptions& options, Console& console)
+      : source_(source),
+        options_(options),
+        console_(console),
+        people_(options.log == "-" ? console.err() : console.out()),
+        view_(people_, options.log != "-" && console.out_is_terminal(), frames_expected()) {
+    if (options.log.empty() || options.log == "-") return;
+    log_.open(options.log, std::ios::binary);
+    if (!log_) throw Error(options.log + ": the log cannot be written; check the folder and its permissions");
+  }
+
+  std::uint64_t run() {
+    const InterruptWatch interrupt;
+    while (!interrupt.came() && (options_.max_frames == 0 || frames_ < options_.max_frames)) {
+      std::optional<SourceFrame> frame;
+      try {
+        frame = source_.next();
+      } catch (const Error& error) {
+        console_.complain(error.what());
+        continue;
+      }
+      if (!frame) break;
+      handle(*frame);
+    }
+    view_.finish();
+    sum_up(interrupt.came());
+    return frames_with_markers_;
+  }
+
+ private:
+  std::optional<std::size_t> frames_expected() const {
+    const std::optional<std::size_t> total = source_.size();
+    if (options_.max_frames == 0) return total;
+    return std::min<std::size_t>(options_.max_frames, total.value_or(options_.max_frames));
+  }
+
+  /// The engine is made for the first frame, since a simulated one tells families and sizes that were not given.
+  void make_engine(const SourceFrame& frame) {
+    EngineOptions engine_options = options_.engine;
+    if (engine_options.families.empty()) {
+      std::set<std::string> families;
+      for (const TruthMarker& marker : frame.truth) families.insert(marker.family);
+      engine_options.families.assign(families.begin(), families.end());
+    }
+    DetectorConfig config = make_config(engine_options);
+    if (!config.camera) config.camera = source_.camera();
+    size_given_ = config.marker_size_m > 0;
+    // With sizes known by marker, poses are computed for one metre and scaled: t is proportional to the size.
+    if (!size_given_ && !frame.truth.empty()) config.marker_size_m = 1;
+    if (!config.camera && size_given_) console_.note("no poses: --camera is missing");
+    if (config.camera && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
+    config.digests = options_.digests;
+    engine_.emplace(open_chosen_backend(engine_options), std::move(config));
+    people_ << "backend " << engine_->backend().name() << " on " << engine_->backend().device().name << '\n';
+  }
+
+  void handle(const SourceFrame& frame) {
+    if (!engine_) make_engine(frame);
+    const std::string refusal = engine_->pose_refusal(frame.image.width(), frame.image.height());
+    if (!refusal.empty() && !refused_) console_.complain(frame.label + ": " + refusal);
+    refused_ = refused_ || !refusal.empty();
+    const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
+    FrameResult result = timed.frame;
+    scale_poses(result.detections, frame.truth);
+    ++frames_;
+    frames_with_markers_ += result.detections.empty() ? 0 : 1;
+    overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
+    wall_ns_ += timed.wall_ns;
+    cpu_ns_ += timed.cpu_ns;
+    if (!options_.log.empty()) {
+      std::ostream& log = options_.log == "-" ? console_.out() : log_;
+      log << to_line(to_json(result, frame.label, timed.cpu_ns, frame.truth)) << '\n';
+    }
+    if (!frame.truth.empty()) {
+      score_.add(frame.truth, result.detections);
+      has_truth_ = true;
+    }
+    if (!options_.svg.empty()) remember_ways(result.detections, frame.truth);
+    if (!options_.picture.empty() && !result.detections.empty()) {
+      picture_ = frame.image;
+      picture_detections_ = result.detections;
+    }
+    show(result, frame.truth);
+    if (result.status == FrameStatus::device_lost) {
+      throw Error(frame.label + ": the device was lost; see berth doctor, or use --backend simd");
+    }
+  }
+
+  void scale_poses(std::vector<Detection>& detections, const std::vector<TruthMarker>& truth) const {
+    for (Detection& detection : detections) {
+      if (!detection.has_pose) continue;
+      const TruthMarker* marker = truth_of(detection, truth);
+      if (marker != nullptr) {
+        for (double& t : detection.pose.t) t *= marker->size_m / engine_->config().marker_size_m;
+      } else if (!size_given_) {
+        detection.has_pose = false;
+      }
+    }
+  }
+
+  void remember_ways(const std::vector<Detection>& detections, const std::vector<TruthMarker>& truth) {
+    for (const TruthMarker& marker : truth) {
+      std::vector<Trajectory::Point>& way = ways_[{marker.family, marker.id}];
+      way.push_back({marker.pose, std::nullopt});
+    }
+    for (const Detection& detection : detections) {
+      if (!detection.has_pose) continue;
+      std::vector<Trajectory::Point>& way = ways_[{detection.family->name, detection.id}];
+      if (truth_of(detection, truth) == nullptr) way.emplace_back();
+      way.back().estimate = detection.pose;
+    }
+  }
+
+  void show(const FrameResult& result, const std::vector<TruthMarker>& truth) {
+    const std::size_t n = result.detections.size();
+    std::string line = fmt::format("{} marker{}, {:.3f} ms", n, n == 1 ? "" : "s",
+                                   static_cast<double>(wall_ns_) / 1e6 / static_cast<double>(frames_));
+    if (result.status == FrameStatus::overflow) line += ", overflow";
+    std::vector<std::string> table;
+    const Detection* nearest = nullptr;
+    for (const Detection& d : result.detections) {
+      std::string row =
+          fmt::format("  {:<20} {:>4}  ({:7.2f}, {:7.2f}) px", d.family->name, d.id, d.center[0], d.center[1]);
+      if (d.has_pose) {
+        row += "  " + place_of(d, truth);
+        if (nearest == nullptr || d.pose.t[2] < nearest->pose.t[2]) nearest = &d;
+      }
+      table.push_back(row);
+    }
+    if (nearest != nullptr) line += fmt::format("  id {} {}", nearest->id, place_of(*nearest, truth));
+    view_.show(frames_, line, table);
+  }
+
+  static std::string place_of(const Detection& d, const std::vector<TruthMarker>& truth) {
+    const std::array<double, 3>& t = d.pose.t;
+    std::string text = fmt::format("x {:+.4f} y {:+.4f} z {:.4f} m", t[0], t[1], t[2]);
+    if (const TruthMarker* marker = truth_of(d, truth)) {
+      text += fmt::format(", off {:.2f} mm {:.3f} deg", distance_m(d.pose, marker->pose) * 1000,
+                          angle_deg(d.pose, marker->pose));
+    }
+    return text;
+  }
+
+  void sum_up(bool by_interrupt) {
+    if (by_interrupt) people_ << "interrupted\n";
+    const double frames = static_cast<double>(std::max<std::uint64_t>(frames_, 1));
+    people_ << fmt::format("{} frame{}, {} with markers", frames_, frames_ == 1 ? "" : "s", frames_with_markers_);
+    if (overflows_ > 0) people_ << fmt::format(", {} overflowed", overflows_);
+    if (frames_ > 0) {
+      people_ << fmt::format("; detection alone {:.3f} ms a frame ({:.0f} frames/s), {:.3f} ms of processor time",
+                             static_cast<double>(wall_ns_) / 1e6 / frames,
+                             frames * 1e9 / static_cast<double>(std::max<std::int64_t>(wall_ns_, 1)),
+                             static_cast<double>(cpu_ns_) / 1e6 / frames);
+    }
+    people_ << '\n';
+    if (has_truth_) score_.print(people_);
+    if (!options_.log.empty() && options_.log != "-") {
+      log_.close();
+      if (!log_) throw Error(options_.log + ": writing the log failed; check the disk's space");
+      people_ << "log         " << options_.log << '\n';
+    }
+    if (!options_.svg.empty()) write_svg();
+    if (!options_.picture.empty() && !picture_detections_.empty()) {
+      write_annotated(options_.picture, picture_.view(), picture_detections_, std::nullopt, 0);
+      people_ << "last frame  " << options_.picture << '\n';
+    }
+    people_.flush();
+  }
+
+  void write_svg() {
+    const std::pair<const MarkerKey, std::vector<Trajectory::Point>>* most = nullptr;
+    const auto found = [](const std::vector<Trajectory::Point>& way) {
+      return std::count_if(way.begin(), way.end(), [](const Trajectory::Point& p) { return p.estimate.has_value(); });
+    };
+    for (const auto& way : ways_) {
+      if (most == nullptr || found(way.second) > found(most->second)) most = &way;
+    }
+    if (most == nullptr || found(most->second) == 0) {
+      console_.note(options_.svg + ": not written, no marker had a pose");
+      return;
+    }
+    Trajectory trajectory;
+    trajectory.title = fmt::format("{} {} in the camera frame, {} of {} frames", most->first.first, most->first.second,
+                                   found(most->second), frames_);
+    const auto scored = score_.markers().find(most->first);
+    trajectory.size_m = scored != score_.markers().end() ? scored->second.size_m : engine_->config().marker_size_m;
+    trajectory.points = most->second;
+    std::ofstream file(options_.svg, std::ios::binary);
+    file << trajectory_svg(trajectory);
+    file.close();
+    if (!file)
+      throw Error(options_.svg + ": the drawing cannot be written; check the folder, its permissions and space");
+    people_ << "trajectory  " << options_.svg << '\n';
+  }
+
+  Source& source_;
+  const StreamOptions& options_;
+  Console& console_;
+  std::ostream& people_;
+  LiveView view_;
+  std::ofstream log_;
+  std::optional<Engine> engine_;
+  bool size_given_ = false, refused_ = false, has_truth_ = false;
+  std::uint64_t frames_ = 0, frames_with_markers_ = 0, overflows_ = 0;
+  std::int64_t wall_ns_ = 0, cpu_ns_ = 0;
+  TruthScore score_;
+  std::map<MarkerKey, std::vector<Trajectory::Point>> ways_;
+  GrayImage picture_;
+  std::vector<Detection> picture_detections_;
+};
+
+}  // namespace
+
+std::uint64_t run_stream(Source& source, const StreamOptions& options, Console& console) {
+  return Stream(source, options, console).run();
+}
+
+}  // namespace berth::cli

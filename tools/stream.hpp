@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "berth/source.hpp"
+#include "console.hpp"
+#include "engine.hpp"
+
+namespace berth::cli {
+
+/// What becomes of a source's frames.
+struct StreamOptions {
+  EngineOptions engine;
+  /// JSON lines, one a frame; "-" is standard output, and what a person reads then goes to standard error.
+  std::string log;
+  /// Trajectory drawing of the marker seen most often.
+  std::string svg;
+  /// Annotated PNG of the last frame that shows a marker.
+  std::string picture;
+  bool digests = false;
+  /// 0 for all.
+  std::uint64_t max_frames = 0;
+};
+
+/// Detects in every frame until the source ends, max_frames is reached or SIGINT comes; then sums up, and with a
+/// simulated source prints the errors against its truth. Families, camera and marker sizes come from the options, else
+/// from what the source knows. Returns how many frames had a marker.
+std::uint64_t run_stream(Source& source, const StreamOptions& options, Console& console);
+
+}  // namespace berth::cli
