@@ -7,6 +7,7 @@ IN(0, u32, histograms)    // [groups, 3, 256]
 OUT(1, u32, levels)       // [4]: black, white, noise, contrast
 PARAMS(normalize)
 SHARED(u32, counts, 768)
+SHARED(u32, quantiles, 3)
 BODY
   EACH_ITEM
     for (int bin = LID; bin < 768; bin += GROUP_SIZE) {
@@ -16,23 +17,24 @@ BODY
     }
   EACH_END
   EACH_ITEM
-    if (LID == 0) {
+    if (LID < 3) {
+      const int permille = LID == 0 ? p.black_permille : LID == 1 ? p.white_permille : p.noise_permille;
       u32 count = 0u;
-      for (int bin = 0; bin < 256; ++bin) count += counts[bin];
-      u32 black = 255u;
-      u32 white = 255u;
-      u32 noise = 255u;
-      u32 below_black = 0u;
-      u32 below_white = 0u;
-      u32 below_noise = 0u;
+      for (int bin = 0; bin < 256; ++bin) count += counts[LID * 256 + bin];
+      u32 level = 255u;
+      u32 below = 0u;
       for (int bin = 0; bin < 256; ++bin) {
-        below_black += counts[bin];
-        below_white += counts[256 + bin];
-        below_noise += counts[512 + bin];
-        if (black == 255u && below_black * 1000u > count * U32(p.black_permille)) black = U32(bin);
-        if (white == 255u && below_white * 1000u > count * U32(p.white_permille)) white = U32(bin);
-        if (noise == 255u && below_noise * 1000u > count * U32(p.noise_permille)) noise = U32(bin);
+        below += counts[LID * 256 + bin];
+        if (level == 255u && below * 1000u > count * U32(permille)) level = U32(bin);
       }
+      quantiles[LID] = level;
+    }
+  EACH_END
+  EACH_ITEM
+    if (LID == 0) {
+      const u32 black = quantiles[0];
+      const u32 white = quantiles[1];
+      const u32 noise = quantiles[2];
       const u32 range = white > black ? white - black : 0u;
       const u32 by_range = (range * U32(p.contrast_permille) + 500u) / 1000u;
       const u32 by_noise = (noise * U32(p.noise_gain_q4) + 8u) >> 4;
