@@ -15,8 +15,8 @@ constexpr double kMostStretch = 1.3;
 
 class Marker {
  public:
-  Marker(const Layer& layer, const RayMap& rays, std::vector<u8>& flags)
-      : layer_(layer), rays_(rays), camera_(rays.camera()), flags_(flags) {}
+  Marker(const Layer& layer, const RayMap& rays, u64 bit, std::vector<u64>& flags)
+      : layer_(layer), rays_(rays), camera_(rays.camera()), bit_(bit), flags_(flags) {}
 
   // The straight edge from a to b of the plane.
   void edge(const Vec2& a, const Vec2& b) {
@@ -67,22 +67,36 @@ class Marker {
 
   void set(int x, int y) {
     if (x < 0 || y < 0 || x >= camera_.width || y >= camera_.height) return;
-    flags_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) + static_cast<std::size_t>(x)] = 1;
+    flags_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) + static_cast<std::size_t>(x)] |= bit_;
   }
 
   const Layer& layer_;
   const RayMap& rays_;
   const CameraModel& camera_;
-  std::vector<u8>& flags_;
+  u64 bit_;
+  std::vector<u64>& flags_;
 };
 
+// The chords of 128 sides leave the circle by 0.0003 of the radius: 0.1 px at 300 px.
+constexpr int kCircleSides = 128;
+
+const std::array<Vec2, kCircleSides>& unit_circle() {
+  static const std::array<Vec2, kCircleSides> points = [] {
+    std::array<Vec2, kCircleSides> result{};
+    for (int i = 0; i < kCircleSides; ++i) {
+      const double angle = 2 * kPi / kCircleSides * i;
+      result[static_cast<std::size_t>(i)] = {exact_cos(angle), exact_sin(angle)};
+    }
+    return result;
+  }();
+  return points;
+}
+
 void mark_circle(Marker& marker, double radius) {
-  // The chords of 128 sides leave the circle by 0.0003 of the radius: 0.1 px at 300 px.
-  constexpr int kSides = 128;
   Vec2 before = {radius, 0};
-  for (int i = 1; i <= kSides; ++i) {
-    const double angle = 2 * kPi / kSides * i;
-    const Vec2 point = {radius * exact_cos(angle), radius * exact_sin(angle)};
+  for (int i = kCircleSides - 1; i >= 0; --i) {
+    const Vec2& unit = unit_circle()[static_cast<std::size_t>(i)];
+    const Vec2 point = {radius * unit[0], radius * unit[1]};
     marker.edge(before, point);
     before = point;
   }
@@ -107,9 +121,9 @@ void mark_lines(int across_count, int along_count, const Differs& differs, const
 
 }  // namespace
 
-void mark_edges(const Layer& layer, const RayMap& rays, std::vector<u8>& flags) {
+void mark_edges(const Layer& layer, const RayMap& rays, u64 bit, std::vector<u64>& flags) {
   const Surface& s = layer.surface();
-  Marker marker(layer, rays, flags);
+  Marker marker(layer, rays, bit, flags);
   if (layer.disc()) {
     mark_circle(marker, s.outer_radius);
     if (s.inner_radius > 0) mark_circle(marker, s.inner_radius);

@@ -9,7 +9,7 @@
 namespace berth::sim {
 
 /// Marks the pixels that an edge of the layer runs through: its outline, and the sides of its cells where the albedo
-/// changes. flags u8[height, width], set to 1. A pixel left unmarked shows one smooth patch of one surface.
-void mark_edges(const Layer& layer, const RayMap& rays, std::vector<u8>& flags);
+/// changes. flags u64[height, width], where `bit` is set. A pixel left unmarked shows one smooth patch of one surface.
+void mark_edges(const Layer& layer, const RayMap& rays, u64 bit, std::vector<u64>& flags);
 
 }  // namespace berth::sim

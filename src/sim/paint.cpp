@@ -61,34 +61,53 @@ class Stack {
  public:
   // Takes the layers of the tile, nearest first, up to one that hides the rest.
   void collect(const std::vector<Layer>& layers, const std::vector<int>& order, const PixelRays& pixel) {
-    stack_.clear();
+    entries_.clear();
+    sides_.clear();
     lines_ = 0;
+    fine_ = false;
     for (int i : order) {
       const Layer& layer = layers[static_cast<std::size_t>(i)];
-      const int before = lines_;
-      const PixelLine one = line_;
-      const Cover cover = cross_outline(layer, pixel);
+      const std::size_t first = sides_.size();
+      bool curved = false;
+      const Cover cover = cross_outline(layer, pixel, curved);
       if (cover == Cover::none) {
-        lines_ = before;
-        line_ = one;
+        sides_.resize(first);
         continue;
       }
+      entries_.push_back({&layer, first, sides_.size(), curved});
+      lines_ += static_cast<int>(sides_.size() - first) + (curved ? 2 : 0);
+      if (sides_.size() > first) line_ = sides_.back();
       if (layer.surface().cells.size() > 1) cross_cells(layer, pixel);
-      stack_.push_back(&layer);
+      fine_ = fine_ || layer.surface().fine;
       if (cover == Cover::full) break;
     }
   }
+  // Edges in the pixel; two or more stand for "not a single straight one".
   int lines() const { return lines_; }
+  // The only one.
   const PixelLine& line() const { return line_; }
+  bool fine() const { return fine_; }
 
-  Seen look(const Vec2& ray, double void_albedo) const {
-    for (const Layer* layer : stack_) {
-      if (layer->hit(ray)) return layer->look(ray);
+  // At a·du + b·dv of the pixel that was collected.
+  Seen look(const PixelRays& pixel, double a, double b, double void_albedo) const {
+    const Vec2 ray = pixel.at(a, b);
+    for (const Entry& entry : entries_) {
+      bool inside = true;
+      for (std::size_t i = entry.first; i < entry.end && inside; ++i) {
+        inside = sides_[i].value + a * sides_[i].ga + b * sides_[i].gb >= 0;
+      }
+      if (inside && (!entry.curved || entry.layer->hit(ray))) return entry.layer->look(ray);
     }
     return {void_albedo, 0};
   }
 
  private:
+  struct Entry {
+    const Layer* layer;
+    // Its sides that cross the pixel, in sides_.
+    std::size_t first, end;
+    bool curved;
+  };
   enum class Cover { none, part, full };
 
   void cross(const PixelLine& line) {
@@ -96,8 +115,11 @@ class Stack {
     ++lines_;
   }
 
-  Cover cross_outline(const Layer& layer, const PixelRays& pixel) {
-    if (!layer.visible()) return Cover::none;
+  Cover cross_outline(const Layer& layer, const PixelRays& pixel, bool& curved) {
+    if (!layer.visible() || layer.low()[0] > pixel.center[0] + pixel.du[0] ||
+        layer.high()[0] < pixel.center[0] - pixel.du[0]) {
+      return Cover::none;
+    }
     bool full = true;
     for (int i = 0; i < layer.sides(); ++i) {
       const PixelLine line = over_pixel(layer.side(i), pixel);
@@ -105,11 +127,14 @@ class Stack {
       if (line.value <= -reach) return Cover::none;
       if (line.value < reach) {
         full = false;
-        cross(line);
+        sides_.push_back(line);
       }
     }
     if (!layer.disc()) return full ? Cover::full : Cover::part;
-    if (!full) return Cover::part;
+    if (!full) {
+      curved = true;
+      return Cover::part;
+    }
     const Vec2 p = layer.plane_point(pixel.center);
     double reach = 0;
     for (const double a : {-0.5, 0.5}) {
@@ -123,7 +148,7 @@ class Stack {
     const Surface& s = layer.surface();
     if (radius - reach > s.outer_radius || radius + reach < s.inner_radius) return Cover::none;
     if (radius + reach < s.outer_radius && (s.inner_radius == 0 || radius - reach > s.inner_radius)) return Cover::full;
-    lines_ += 2;  // curved: for the lattice
+    curved = true;
     return Cover::part;
   }
 
@@ -166,7 +191,9 @@ class Stack {
     }
   }
 
-  std::vector<const Layer*> stack_;
+  std::vector<Entry> entries_;
+  std::vector<PixelLine> sides_;
+  bool fine_ = false;
   int lines_ = 0;
   PixelLine line_{};
 };
@@ -175,10 +202,16 @@ class Stack {
 struct Lattice {
   int count, step;
 };
-constexpr Lattice kStill = {55, 34};
-constexpr Lattice kMoving = {21, 13};
+constexpr Lattice kFine = {55, 34};    // where markers are
+constexpr Lattice kCoarse = {21, 13};  // elsewhere
+constexpr Lattice kInstant = {8, 5};   // for each of several instants
 
-Seen lattice_mean(const Stack& stack, const PixelRays& pixel, const Lattice& lattice, u64 key, double void_albedo) {
+// Mean albedo, and mean albedo times the cosine to the light.
+struct Sum {
+  double albedo, lit;
+};
+
+Sum lattice_mean(const Stack& stack, const PixelRays& pixel, const Lattice& lattice, u64 key, double void_albedo) {
   const u64 bits = scatter(key);
   const double x0 = static_cast<double>(bits >> 40) * (1.0 / 16777216.0);
   const double y0 = static_cast<double>((bits >> 8) & 0xffffff) * (1.0 / 16777216.0);
@@ -188,11 +221,33 @@ Seen lattice_mean(const Stack& stack, const PixelRays& pixel, const Lattice& lat
     double b = y0 + static_cast<double>(i * lattice.step % lattice.count) / lattice.count;
     a -= a >= 1 ? 1.5 : 0.5;
     b -= b >= 1 ? 1.5 : 0.5;
-    const Seen seen = stack.look(pixel.at(a, b), void_albedo);
+    const Seen seen = stack.look(pixel, a, b, void_albedo);
     albedo += seen.albedo;
     lit += seen.albedo * seen.facing;
   }
   return {albedo / lattice.count, lit / lattice.count};
+}
+
+Sum pixel_mean(const Stack& stack, const PixelRays& pixel, const Lattice& lattice, u64 key, double void_albedo) {
+  if (stack.lines() >= 2) return lattice_mean(stack, pixel, lattice, key, void_albedo);
+  if (stack.lines() == 0) {
+    const Seen seen = stack.look(pixel, 0, 0, void_albedo);
+    return {seen.albedo, seen.albedo * seen.facing};
+  }
+  // One straight edge: both sides' colours, just inside the pixel's corners where no other edge can be.
+  const double share = inner_share(stack.line());
+  const double a = stack.line().ga > 0 ? 0.49 : -0.49, b = stack.line().gb > 0 ? 0.49 : -0.49;
+  const Seen inner = stack.look(pixel, a, b, void_albedo), outer = stack.look(pixel, -a, -b, void_albedo);
+  return {share * inner.albedo + (1 - share) * outer.albedo,
+          share * (inner.albedo * inner.facing) + (1 - share) * (outer.albedo * outer.facing)};
+}
+
+const Layer* first_hit(const std::vector<Layer>& layers, const std::vector<int>& order, const PixelRays& pixel) {
+  for (int i : order) {
+    const Layer& layer = layers[static_cast<std::size_t>(i)];
+    if (layer.visible() && layer.hit(pixel.center)) return &layer;
+  }
+  return nullptr;
 }
 
 // Ambient and direct light, and glare, along one ray.
@@ -239,72 +294,56 @@ std::vector<double> paint(const Scene& scene, const std::vector<Surface>& surfac
   double nearest = 10;
   for (const SceneMarker& marker : scene.markers) nearest = std::min(nearest, marker.pose.t[2]);
   const double motion = motion_px(rays.camera(), scene.motion, nearest);
-  // An odd number, so that the middle one is mid-exposure; two instants a pixel leave no steps that the blur would not
-  // hide.
-  const int instants = motion < 0.02 ? 1 : std::min(41, 2 * static_cast<int>(motion + 1.5) + 1);
+  // An odd number, so that the middle one is mid-exposure; steps of a pixel are not seen, since each
+  // instant is itself averaged over the pixel.
+  const int instants = motion < 0.02 ? 1 : std::min(41, 2 * static_cast<int>(0.5 * motion + 1.5) + 1);
 
   const Vec3 to_light = normalized(scene.lighting.direction);
   std::vector<std::vector<Layer>> exposures(static_cast<std::size_t>(instants));
-  std::vector<u8> flags(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  // Bit k of a pixel: an edge runs through it at instant k.
+  std::vector<u64> flags(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   for (int k = 0; k < instants; ++k) {
     const double tau = (k - 0.5 * (instants - 1)) / instants;
     for (const Surface& surface : surfaces) {
       const Layer layer(surface, instants == 1 ? surface.pose : moved(scene.motion, surface.pose, tau), to_light);
-      if (layer.visible()) mark_edges(layer, rays, flags);
+      if (layer.visible()) mark_edges(layer, rays, u64{1} << k, flags);
       exposures[static_cast<std::size_t>(k)].push_back(layer);
     }
   }
-  const std::vector<Layer>& middle = exposures[static_cast<std::size_t>(instants / 2)];
   const Tiles tiles(exposures, rays);
-  const Lattice lattice = instants == 1 ? kStill : kMoving;
 
   std::vector<double> radiance(flags.size());
   Stack stack;
+  // The layer that the pixel before showed at each instant: this one's as well, where no edge lies between.
+  std::vector<const Layer*> shown(static_cast<std::size_t>(instants));
   for (int y = 0; y < height; ++y) {
-    const Layer* shown = nullptr;  // by the pixel before, where no edge lies between
     for (int x = 0; x < width; ++x) {
       const std::size_t at =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       const PixelRays pixel = pixel_rays(rays, x, y);
+      if (x % 64 == 0) std::fill(shown.begin(), shown.end(), nullptr);
       double albedo = 0, lit = 0;
+      const auto add_smooth = [&](int k) {
+        const Layer*& layer = shown[static_cast<std::size_t>(k)];
+        if (layer == nullptr) layer = first_hit(exposures[static_cast<std::size_t>(k)], tiles.layers_at(x, y), pixel);
+        const Seen seen = layer != nullptr ? layer->look(pixel.center) : Seen{scene.void_albedo, 0};
+        albedo += seen.albedo;
+        lit += seen.albedo * seen.facing;
+      };
       if (flags[at] == 0) {
-        if (x % Tiles::kSide_px == 0) shown = nullptr;
-        if (shown == nullptr) {
-          for (int i : tiles.layers_at(x, y)) {
-            const Layer& layer = middle[static_cast<std::size_t>(i)];
-            if (!layer.visible() || !layer.hit(pixel.center)) continue;
-            shown = &layer;
-            break;
-          }
-        }
-        const Seen seen = shown != nullptr ? shown->look(pixel.center) : Seen{scene.void_albedo, 0};
-        albedo = seen.albedo;
-        lit = seen.albedo * seen.facing;
+        add_smooth(instants / 2);
       } else {
-        shown = nullptr;
         for (int k = 0; k < instants; ++k) {
-          stack.collect(exposures[static_cast<std::size_t>(k)], tiles.layers_at(x, y), pixel);
-          if (stack.lines() >= 2) {
-            const Seen mean = lattice_mean(stack, pixel, lattice, at * 64 + static_cast<u64>(k), scene.void_albedo);
-            albedo += mean.albedo;
-            lit += mean.facing;
+          if ((flags[at] >> k & 1) == 0) {
+            add_smooth(k);
             continue;
           }
-          double share = 1, a = 0, b = 0;
-          if (stack.lines() == 1) {
-            share = inner_share(stack.line());
-            // Just inside the pixel's corners, where no other line can be.
-            a = stack.line().ga > 0 ? 0.49 : -0.49;
-            b = stack.line().gb > 0 ? 0.49 : -0.49;
-          }
-          const Seen inner = stack.look(pixel.at(a, b), scene.void_albedo);
-          albedo += share * inner.albedo;
-          lit += share * (inner.albedo * inner.facing);
-          if (share < 1) {
-            const Seen outer = stack.look(pixel.at(-a, -b), scene.void_albedo);
-            albedo += (1 - share) * outer.albedo;
-            lit += (1 - share) * (outer.albedo * outer.facing);
-          }
+          shown[static_cast<std::size_t>(k)] = nullptr;
+          stack.collect(exposures[static_cast<std::size_t>(k)], tiles.layers_at(x, y), pixel);
+          const Lattice& lattice = instants > 1 ? kInstant : stack.fine() ? kFine : kCoarse;
+          const Sum sum = pixel_mean(stack, pixel, lattice, at * 64 + static_cast<u64>(k), scene.void_albedo);
+          albedo += sum.albedo;
+          lit += sum.lit;
         }
         albedo /= instants;
         lit /= instants;

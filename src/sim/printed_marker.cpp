@@ -66,6 +66,7 @@ Surface pattern_surface(const MarkerFamily& family, u64 code, double size_m, con
   surface.cells = pattern_cells(family, code, white, black);
   const double width = (family.total_width + 2 * margin_modules) * module;
   surface.outline = rectangle(width, width);
+  surface.fine = true;
   return surface;
 }
 

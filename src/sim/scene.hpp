@@ -33,6 +33,8 @@ struct Surface {
   Vec2 slope = {0, 0};
   /// Smooth random texture: relative amplitude and wavelength.
   double grain = 0, grain_m = 0.01;
+  /// Rendered with more points a pixel: markers, and what looks like one.
+  bool fine = false;
 };
 
 /// A printed marker on its plate.

@@ -10,7 +10,7 @@ namespace berth::sim {
 /// Which layers each tile of the image may show, nearest first; what a layer hides in the whole tile is left out.
 class Tiles {
  public:
-  static constexpr int kSide_px = 16;
+  static constexpr int kSide_px = 8;
 
   /// `exposures` holds the same layers, farthest first, at each instant of the exposure.
   Tiles(const std::vector<std::vector<Layer>>& exposures, const RayMap& rays);
