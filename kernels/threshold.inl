@@ -23,8 +23,8 @@ BODY
       u32 row1 = 0u;
       u32 row2 = 0u;
       u32 row3 = 0u;
-      for (int half = 0; half < 2; ++half) {
-        const int x = word_x * 2 + half;
+      for (int side = 0; side < 2; ++side) {
+        const int x = word_x * 2 + side;
         const int left = max(x - 1, 0);
         const int right = min(x + 1, stride - 1);
         // Columns first: the extrema of three tiles, for this word and its neighbours.
@@ -50,7 +50,7 @@ BODY
         for (int k = 0; k < 4; ++k) {
           if (((judged >> (8 * k)) & 1u) != 0u) {
             const u32 limit = ((middle >> (8 * k)) & 255u) * 0x01010101u;
-            const int at = 16 * half + 4 * k;
+            const int at = 16 * side + 4 * k;
             // The multiplication gathers the four flag bits in the top nibble, leftmost pixel lowest.
             row0 |= ((bytes_ge(limit, pixels[first + k]) * 0x10204080u) >> 28) << at;
             row1 |= ((bytes_ge(limit, pixels[first + k + p.row_words * 8]) * 0x10204080u) >> 28) << at;

@@ -1,11 +1,11 @@
 // The darkest and the lightest pixel of every 4 × 4 tile; an item makes the four tiles of a tile word.
 FN u32 lowest_byte(u32 word) {
-  const u32 half = bytes_min(word, word >> 16);
-  return bytes_min(half, half >> 8) & 255u;
+  const u32 pair = bytes_min(word, word >> 16);
+  return bytes_min(pair, pair >> 8) & 255u;
 }
 FN u32 highest_byte(u32 word) {
-  const u32 half = bytes_max(word, word >> 16);
-  return bytes_max(half, half >> 8) & 255u;
+  const u32 pair = bytes_max(word, word >> 16);
+  return bytes_max(pair, pair >> 8) & 255u;
 }
 KERNEL(tile_extrema)
 IN(0, u32, pixels)     // [tile_rows * 4, row_words * 4]

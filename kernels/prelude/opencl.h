@@ -4,7 +4,8 @@ typedef uint u32;
 typedef int s32;
 
 #define FN static inline
-#define KERNEL(name) __kernel __attribute__((reqd_work_group_size(GROUP_SIZE, 1, 1))) void name(
+// Prefixed, because the language has functions of its own that are called like operations (normalize).
+#define KERNEL(name) __kernel __attribute__((reqd_work_group_size(GROUP_SIZE, 1, 1))) void berth_##name(
 #define IN(i, T, x) __global const T* restrict x,
 #define OUT(i, T, x) __global T* restrict x,
 #define INOUT(i, T, x) __global T* restrict x,
