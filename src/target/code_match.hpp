@@ -33,6 +33,7 @@ class CodeMatcher {
   CodeBook book_;
   double bits_likeness_;
   double levels_likeness_;
+  double least_evidence_;
   bool levels_allowed_;
 };
 

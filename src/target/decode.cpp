@@ -94,14 +94,19 @@ bool Decoder::decode(View2D<const u8> image, const QuadCandidate& quad, Detectio
     if (layout.reversed_border != quad.reversed_border) continue;
     Reading reading;
     Found found;
-    const auto try_corners = [&](const Corners& corners, double spread, Match how) {
+    const auto read = [&](const Corners& corners, double spread) {
       QuadMap map;
-      if (!map.set(corners, layout.border_width, layout.reach) || !probe_border(image, map, layout)) return false;
-      return read_cells(image, map, layout, spread, reading) && match_group(group, reading, how, found);
+      return map.set(corners, layout.border_width, layout.reach) && probe_border(image, map, layout) &&
+             read_cells(image, map, layout, spread, reading);
     };
-    bool done = try_corners(quad.fine, 0, &CodeMatcher::match_bits);
-    if (!done && quad.has_fine) done = try_corners(quad.coarse, 0, &CodeMatcher::match_bits);
-    if (!done) done = try_corners(quad.fine, kSpread, &CodeMatcher::match_levels);
+    const bool readable = read(quad.fine, 0);
+    bool done = readable && match_group(group, reading, &CodeMatcher::match_bits, found);
+    if (!done && quad.has_fine) {
+      done = read(quad.coarse, 0) && match_group(group, reading, &CodeMatcher::match_bits, found);
+    }
+    if (!done && readable) {
+      done = read(quad.fine, kSpread) && match_group(group, reading, &CodeMatcher::match_levels, found);
+    }
     if (!done) continue;
     fill(quad, found, mean_distance(reading, layout.x.size()), detection);
     return true;

@@ -14,6 +14,10 @@ constexpr double kMinContrast = 4;
 constexpr int kMaxProbesWrong = 4;
 constexpr double kMaxRingWrong = 0.25;
 
+// A marker's cells vary by at least this share of half the border's contrast, even when the lens blurs them into each
+// other; a plain dark or light shape's do not.
+constexpr double kMinVariation = 0.25;
+
 // Bilinear interpolation; pixel centres at integers. Returns false outside the image.
 inline bool sample(View2D<const u8> image, double x, double y, double& value) {
   if (!(x > -0.5 && y > -0.5 && x < image.width - 0.5 && y < image.height - 0.5)) return false;
@@ -150,6 +154,7 @@ bool read_cells(View2D<const u8> image, const QuadMap& map, const Layout& layout
   const int nv = points_for(reading.module_v_px);
 
   reading.complete = true;
+  double mean = 0, square = 0;
   for (std::size_t i = 0; i < layout.x.size(); ++i) {
     const double u = layout.x[i] + 0.5;
     const double v = layout.y[i] + 0.5;
@@ -166,8 +171,12 @@ bool read_cells(View2D<const u8> image, const QuadMap& map, const Layout& layout
     const double threshold = (dark.at(u - middle, v - middle) + light.at(u - middle, v - middle)) / 2;
     reading.value[i] = inside ? sum / (nu * nv) - threshold : 0;
     reading.complete = reading.complete && inside;
+    mean += reading.value[i];
+    square += reading.value[i] * reading.value[i];
   }
-  return true;
+  const double cells = static_cast<double>(layout.x.size());
+  const double least = kMinVariation * reading.half_contrast;
+  return square - mean * mean / cells >= cells * least * least;
 }
 
 }  // namespace berth

@@ -28,7 +28,7 @@ struct Reading {
 bool probe_border(View2D<const u8> image, const QuadMap& map, const Layout& layout);
 
 /// Reads every cell. `spread` is the share of a module's side over which a cell is averaged (0: its centre only).
-/// Returns false when there is no border to be seen.
+/// Returns false when there is no border to be seen, or nothing inside it.
 bool read_cells(View2D<const u8> image, const QuadMap& map, const Layout& layout, double spread, Reading& reading);
 
 }  // namespace berth
