@@ -12,8 +12,8 @@ namespace berth {
 namespace {
 
 constexpr int kMaxSide = 16384;
-constexpr int kHistogramGroups = 8;
-constexpr int kHistogramStep = 4;
+constexpr int kHistogramGroups = 2;
+constexpr int kHistogramStep = 8;
 
 // What a contour and a quadrilateral must have to be worth a look; px. A 12 px marker tilted by 60° is 6 px wide.
 constexpr int kMinContourSide = 5;

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "berth/ops.hpp"
+#include "berth/types.hpp"
+
+/// Operations with row code, the reference's signatures. Each file is compiled for every instruction set Highway knows
+/// here and picks one at run time.
+namespace berth::simd_backend {
+
+void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, u32* maxima);
+void tile_histogram(const tile_histogram_params& p, const u32* minima, const u32* maxima, u32* histograms);
+void threshold(const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima, const u32* levels,
+               u32* bits);
+void despeckle(const despeckle_params& p, const u32* bits, u32* clean);
+void run_count(const run_count_params& p, const u32* bits, u32* offsets);
+void run_emit(const run_emit_params& p, const u32* bits, const u32* offsets, u32* cracks);
+void run_link(const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks, u32* nodes);
+void contour_measure(const contour_measure_params& p, const u32* nodes, const u32* offsets, u32* spans);
+void contour_collect(const contour_collect_params& p, const u32* spans, const u32* offsets, u32* contours);
+void contour_trace(const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points);
+void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads);
+void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* levels, const s32* quads, s32* edges);
+
+}  // namespace berth::simd_backend
+
+/// Defines the dispatching function of an operation; its arguments, then their names in parentheses.
+#define BERTH_SIMD_DISPATCH(op, parameters, arguments)          \
+  HWY_EXPORT(op);                                               \
+  void op parameters { HWY_DYNAMIC_DISPATCH(op) arguments; }
