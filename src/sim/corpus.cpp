@@ -17,6 +17,8 @@ constexpr double kTag_m = 0.1;
 struct Range {
   double low, high;
   double draw(Random& random) const { return random.uniform(low, high); }
+  // As many below the geometric mean as above.
+  double draw_ratio(Random& random) const { return low * exact_pow(high / low, random.uniform(0, 1)); }
 };
 
 // A marker's place in the image: nothing else may come within `radius` of the point.
@@ -129,7 +131,7 @@ class Frame {
   /// Free markers of tag36h11 with different ids.
   void free_markers(int count, Range side_px, double tilt_deg) {
     for (int i = 0; i < count; ++i) {
-      const double side = side_px.draw(random);
+      const double side = side_px.draw_ratio(random);
       const int id = (random.integer(0, 586 / count) * count + i) % 587;
       Pose pose;
       // The pattern's half diagonal over half the border's side, with margin and plate.
