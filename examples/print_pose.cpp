@@ -2,6 +2,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "berth/detector.hpp"
+#include "berth/error.hpp"
 
 int main(int argc, char** argv) try {
   const cv::Mat image = cv::imread(argc > 1 ? argv[1] : "dock.png", cv::IMREAD_GRAYSCALE);
