@@ -197,7 +197,7 @@ void add_dock_markers(Scene& scene, const Pose& body) {
     SceneMarker marker;
     marker.id = id;
     marker.size_m = size;
-    marker.pose = marker_of_plane(compose(body, translation(x, y, 0)), size);
+    marker.pose = compose(body, translation(x, y, 0));
     marker.margin_modules = 0.25;
     marker.plate_m = plate;
     marker.plate_albedo = 0.3;

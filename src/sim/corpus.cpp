@@ -119,7 +119,7 @@ class Frame {
     marker.family = family;
     marker.id = id;
     marker.size_m = kTag_m;
-    marker.pose = marker_of_plane(plane, kTag_m);
+    marker.pose = plane;
     marker.margin_modules = random.uniform(0, 0.8);
     marker.plate_m = random.chance(0.7) ? random.uniform(0.002, 0.02) : 0;
     marker.plate_albedo = random.uniform(0.08, 0.8);

@@ -204,7 +204,7 @@ struct Lattice {
 };
 constexpr Lattice kFine = {55, 34};    // where markers are
 constexpr Lattice kCoarse = {21, 13};  // elsewhere
-constexpr Lattice kInstant = {8, 5};   // for each of several instants
+constexpr Lattice kInstant = {8, 5};   // for each of many instants
 
 // Mean albedo, and mean albedo times the cosine to the light.
 struct Sum {
@@ -340,7 +340,7 @@ std::vector<double> paint(const Scene& scene, const std::vector<Surface>& surfac
           }
           shown[static_cast<std::size_t>(k)] = nullptr;
           stack.collect(exposures[static_cast<std::size_t>(k)], tiles.layers_at(x, y), pixel);
-          const Lattice& lattice = instants > 1 ? kInstant : stack.fine() ? kFine : kCoarse;
+          const Lattice& lattice = instants > 7 ? kInstant : instants == 1 && stack.fine() ? kFine : kCoarse;
           const Sum sum = pixel_mean(stack, pixel, lattice, at * 64 + static_cast<u64>(k), scene.void_albedo);
           albedo += sum.albedo;
           lit += sum.lit;

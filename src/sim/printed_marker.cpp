@@ -6,27 +6,10 @@
 #include "berth/error.hpp"
 
 namespace berth::sim {
-namespace {
-
-// Columns: the marker's axes in the plane frame. X_W runs down the left side (P0 to P1), Y_W along the top (P0 to P3),
-// Z_W = X_W × Y_W towards the viewer.
-constexpr Mat3 kMarkerAxes = {0, 1, 0, 1, 0, 0, 0, 0, -1};
-
-Pose marker_in_plane() {
-  Pose pose;
-  pose.R = kMarkerAxes;
-  return pose;
-}
-
-}  // namespace
-
 std::array<Vec3, 4> marker_corners(double size_m) {
   const double h = size_m / 2;
-  return {Vec3{-h, -h, 0}, Vec3{h, -h, 0}, Vec3{h, h, 0}, Vec3{-h, h, 0}};
+  return {Vec3{-h, -h, 0}, Vec3{-h, h, 0}, Vec3{h, h, 0}, Vec3{h, -h, 0}};
 }
-
-Pose plane_of_marker(const Pose& marker, double /*size_m*/) { return compose(marker, inverse(marker_in_plane())); }
-Pose marker_of_plane(const Pose& plane, double /*size_m*/) { return compose(plane, marker_in_plane()); }
 
 double needed_modules(const MarkerFamily& family) { return std::max(family.total_width, family.border_width + 2); }
 
@@ -54,12 +37,12 @@ std::vector<Vec2> rectangle(double width_m, double height_m) {
   return {{-w, -h}, {w, -h}, {w, h}, {-w, h}};
 }
 
-Surface pattern_surface(const MarkerFamily& family, u64 code, double size_m, const Pose& plane, double margin_modules,
+Surface pattern_surface(const MarkerFamily& family, u64 code, double size_m, const Pose& pose, double margin_modules,
                         double white, double black) {
   const double module = size_m / family.border_width;
   const int side = family.total_width + 2;
   Surface surface;
-  surface.pose = plane;
+  surface.pose = pose;
   surface.columns = surface.rows = side;
   surface.cell_width = surface.cell_height = module;
   surface.left = surface.top = -0.5 * side * module;
@@ -76,13 +59,12 @@ std::vector<Surface> marker_surfaces(const SceneMarker& marker) {
     throw Error("simulator: " + marker.family + " has no id " + std::to_string(marker.id) + ": use 0 to " +
                 std::to_string(shape.codes.size() - 1));
   }
-  const Pose plane = plane_of_marker(marker.pose, marker.size_m);
-  const Surface pattern = pattern_surface(shape, shape.codes[static_cast<std::size_t>(marker.id)], marker.size_m, plane,
-                                          marker.margin_modules, marker.white, marker.black);
+  const Surface pattern = pattern_surface(shape, shape.codes[static_cast<std::size_t>(marker.id)], marker.size_m,
+                                          marker.pose, marker.margin_modules, marker.white, marker.black);
   std::vector<Surface> surfaces;
   if (marker.plate_m > 0) {
     Surface plate;
-    plate.pose = plane;
+    plate.pose = marker.pose;
     const double width = 2 * pattern.outline[2][0] + 2 * marker.plate_m;
     plate.outline = rectangle(width, width);
     plate.cells = {marker.plate_albedo};

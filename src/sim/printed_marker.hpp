@@ -10,14 +10,10 @@ namespace berth::sim {
 
 // The simulator's own idea of a printed marker and of the marker frame, apart from the engine's for honest tests.
 
-/// Corners of the border square in the marker frame (docs/coordinate-frames.md), paper's order: upper left, lower left,
-/// lower right, upper right of the upright marker.
+/// Corners of the border square in the marker frame (docs/coordinate-frames.md: origin in the middle, x right, y down,
+/// z into the plate: that of a Surface), paper's order: upper left, lower left, lower right, upper right of the upright
+/// marker.
 std::array<Vec3, 4> marker_corners(double size_m);
-
-/// The plane frame of a Surface (x right, y down, z into the plate, origin at the marker's middle) of a marker pose,
-/// and back.
-Pose plane_of_marker(const Pose& marker, double size_m);
-Pose marker_of_plane(const Pose& plane, double size_m);
 
 /// Width of the pattern with one light module around the border, in modules: what a decoder needs to see.
 double needed_modules(const MarkerFamily& family);
@@ -26,8 +22,8 @@ double needed_modules(const MarkerFamily& family);
 /// modules. Modules that carry nothing (the corners of round families) are light: such markers are printed on white.
 std::vector<double> pattern_cells(const MarkerFamily& family, u64 code, double white, double black);
 
-/// The pattern of a code word as a surface; `plane` as in plane_of_marker.
-Surface pattern_surface(const MarkerFamily& family, u64 code, double size_m, const Pose& plane, double margin_modules,
+/// The pattern of a code word as a surface.
+Surface pattern_surface(const MarkerFamily& family, u64 code, double size_m, const Pose& pose, double margin_modules,
                         double white, double black);
 
 /// The plate (where there is one) and the pattern, far to near. Throws Error on an unknown family or id.

@@ -117,7 +117,7 @@ SceneMarker read_marker(TomlReader& reader) {
   const Vec3 angles = reader.triple("rotation_deg", {0, 0, 0}, -180, 180);
   Pose plane = translation(at[0], at[1], at[2]);
   plane.R = rotation(radians(angles[0]), radians(angles[1]), radians(angles[2]));
-  marker.pose = marker_of_plane(plane, marker.size_m);
+  marker.pose = plane;
   marker.margin_modules = reader.number("margin_modules", marker.margin_modules, 0, 20);
   marker.plate_m = reader.number("plate_m", marker.plate_m, 0, 5);
   marker.plate_albedo = reader.number("plate_albedo", marker.plate_albedo, 0, 1);

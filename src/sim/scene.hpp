@@ -43,7 +43,7 @@ struct SceneMarker {
   int id = 0;
   /// Side of the border square, as in Detection::corners and MarkerFamily::border_width.
   double size_m = 0.1;
-  /// Marker frame to camera frame, at mid-exposure (see marker_plane).
+  /// Marker frame (origin in the middle, x right, y down, z into the plate) to camera frame, at mid-exposure.
   Pose pose;
   /// Light margin around the pattern's total_width, in modules.
   double margin_modules = 0.5;
