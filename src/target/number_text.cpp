@@ -16,7 +16,10 @@ std::string shortest_decimal(double value) {
     out << value;
     text = out.str();
     double back = 0;
-    if (parse_decimal(text, back) && back == value) break;
+    // Numbers of everyday size are written out: 480, not 4.8e+02.
+    const bool everyday = value < 1e15 && value > -1e15 && (value >= 1e-5 || value <= -1e-5 || value == 0);
+    const bool written_out = text.find('e') == std::string::npos || !everyday;
+    if (written_out && parse_decimal(text, back) && back == value) break;
   }
   return text;
 }
