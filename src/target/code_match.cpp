@@ -5,6 +5,7 @@
 
 #include "target/blur.hpp"
 #include "target/evidence.hpp"
+#include "target/short_list.hpp"
 
 namespace berth {
 namespace {
@@ -24,9 +25,6 @@ constexpr double kRivalOdds = 1e6;
 // Lens blur supposed before anything is known, and the ones tried on a candidate, px.
 constexpr double kUsualBlur_px = 0.8;
 constexpr double kTriedBlur_px[] = {0.5, 1.0, 1.6};
-
-// Candidates by sharpened levels that are compared in full.
-constexpr int kShortList = 8;
 
 double power(double base, int exponent) {
   double result = 1;
@@ -118,52 +116,6 @@ u64 signs(const Levels& levels, std::size_t n) {
   return word;
 }
 
-struct ShortList {
-  std::array<int, kShortList> entry;
-  int size = 0;
-};
-
-// The words whose sum of agreement with the levels is largest, largest first, the first in the table of equal ones.
-ShortList likely_words(const std::vector<u64>& words, const Levels& levels, std::size_t n, double full_level) {
-  // Agreement of every value of every byte of a word with its eight levels, so that a word costs a few look-ups.
-  std::array<std::array<s32, 256>, kMaxCells / 8> agreement;
-  const std::size_t bytes = (n + 7) / 8;
-  for (std::size_t byte = 0; byte < bytes; ++byte) {
-    std::array<s32, 256>& table = agreement[byte];
-    s32 level[8];
-    table[0] = 0;
-    for (std::size_t k = 0; k < 8; ++k) {
-      const std::size_t i = 8 * byte + k;
-      // One glaring cell must not outvote the others.
-      const double limited = i < n ? std::min(1.5, std::max(-1.5, levels[i] / full_level)) : 0.0;
-      level[k] = static_cast<s32>(limited * 4096);
-      table[0] -= level[k];
-    }
-    for (std::size_t k = 0; k < 8; ++k) {
-      const std::size_t half = std::size_t{1} << k;
-      for (std::size_t v = 0; v < half; ++v) table[half + v] = table[v] + 2 * level[k];
-    }
-  }
-
-  ShortList list;
-  std::array<s32, kShortList> score;
-  s32 least = INT32_MIN;
-  for (std::size_t e = 0; e < words.size(); ++e) {
-    s32 sum = 0;
-    for (std::size_t byte = 0; byte < bytes; ++byte) sum += agreement[byte][(words[e] >> (8 * byte)) & 255];
-    if (sum <= least) continue;
-    int at = list.size < kShortList ? list.size++ : kShortList - 1;
-    for (; at > 0 && score[at - 1] < sum; --at) {
-      score[at] = score[at - 1];
-      list.entry[at] = list.entry[at - 1];
-    }
-    score[at] = sum;
-    list.entry[at] = static_cast<int>(e);
-    if (list.size == kShortList) least = score[kShortList - 1];
-  }
-  return list;
-}
-
 }  // namespace
 
 CodeMatcher::CodeMatcher(const MarkerFamily& family, const Layout& layout, int max_hamming)
@@ -196,7 +148,7 @@ CodeMatch CodeMatcher::match_levels(const Layout& layout, const Reading& reading
 
   Levels sharp;
   sharpen(layout, reading, blur_taps(reading, kUsualBlur_px), sharp);
-  const ShortList list = likely_words(book_.words(), sharp, n, reading.half_contrast);
+  const ShortList list = likely_words(book_, sharp, reading.half_contrast);
 
   CodeMatch best;
   double rival = 0;
