@@ -64,6 +64,11 @@ class Canvas {
     cv::putText(picture_, text, origin, kFont, scale_of(px), kBlack, 3 * thickness_ + 1, cv::LINE_AA);
     cv::putText(picture_, text, origin, kFont, scale_of(px), colour, thickness_, cv::LINE_AA);
   }
+  /// In the lower left corner.
+  void caption(const std::string& words) {
+    const cv::Size2d size = text_size(words, text_px_);
+    text(words, {size.width / 2 + text_px_, picture_.rows - 1.2 * text_px_}, text_px_, kYellow);
+  }
 
  private:
   /// Hershey's capitals are about 21 px high at scale 1.
@@ -80,7 +85,20 @@ class Canvas {
   double text_px_ = 12;
 };
 
-void draw_axes(Canvas& canvas, const Pose& pose, const CameraModel& camera, double length_m) {
+/// The longest side of the quadrilateral.
+double side_of(const std::array<std::array<double, 2>, 4>& corners) {
+  double longest = 0;
+  for (int i = 0; i < 4; ++i) {
+    const double dx = corners[i][0] - corners[(i + 1) % 4][0], dy = corners[i][1] - corners[(i + 1) % 4][1];
+    longest = std::max(longest, std::sqrt(dx * dx + dy * dy));
+  }
+  return longest;
+}
+
+void draw_axes(Canvas& canvas, const Detection& detection, const CameraModel& camera) {
+  const Pose& pose = detection.pose;
+  // Half a side, from its size in the image: markers of one picture may differ in size.
+  const double length_m = side_of(detection.corners) / 2 * pose.t[2] / camera.fx;
   const auto project = [&](double x, double y, double z) -> std::optional<cv::Point2d> {
     const auto row = [&](int i) {
       return pose.R[3 * i] * x + pose.R[3 * i + 1] * y + pose.R[3 * i + 2] * z + pose.t[i];
@@ -108,7 +126,7 @@ cv::Rect2d box_of(const Quad& quad) {
 void draw_label(Canvas& canvas, const std::string& label, const Quad& quad, std::vector<cv::Rect2d>& taken) {
   const cv::Rect2d box = box_of(quad);
   const cv::Point2d middle = (quad[0] + quad[1] + quad[2] + quad[3]) / 4;
-  const double px = canvas.text_px();
+  const double px = std::clamp(0.1 * std::min(box.width, box.height), canvas.text_px(), 3 * canvas.text_px());
   const cv::Size2d size = canvas.text_size(label, px);
   if (size.width < 0.6 * box.width && size.height < 0.2 * box.height) {
     canvas.text(label, middle, px, kYellow);
@@ -136,8 +154,10 @@ void draw_label(Canvas& canvas, const std::string& label, const Quad& quad, std:
 }  // namespace
 
 void write_annotated(const std::string& path, View2D<const u8> image, const std::vector<Detection>& detections,
-                     const std::optional<CameraModel>& camera, double marker_size_m) {
+                     const std::optional<CameraModel>& camera) {
   Canvas canvas(image);
+  const bool one_family = std::all_of(detections.begin(), detections.end(),
+                                      [&](const Detection& d) { return d.family == detections.front().family; });
   std::vector<Quad> quads;
   std::vector<cv::Rect2d> taken;
   for (const Detection& detection : detections) {
@@ -150,7 +170,7 @@ void write_annotated(const std::string& path, View2D<const u8> image, const std:
     const Quad& quad = quads[d];
     for (int i = 1; i < 4; ++i) canvas.line(quad[i], quad[(i + 1) % 4], kGreen);
     canvas.line(quad[0], quad[1], kRed);
-    if (detections[d].has_pose && camera) draw_axes(canvas, detections[d].pose, *camera, marker_size_m / 2);
+    if (detections[d].has_pose && camera) draw_axes(canvas, detections[d], *camera);
     canvas.dot(quad[0], kRed);
   }
   for (std::size_t d = 0; d < quads.size(); ++d) {
@@ -162,8 +182,10 @@ void write_annotated(const std::string& path, View2D<const u8> image, const std:
       canvas.text(std::to_string(i + 1), quad[i] + out * (0.9 * canvas.text_px() / length), 0.75 * canvas.text_px(),
                   i == 0 ? kRed : kGreen);
     }
-    draw_label(canvas, detections[d].family->name + " " + std::to_string(detections[d].id), quad, taken);
+    const std::string family = one_family ? "id" : detections[d].family->name;
+    draw_label(canvas, family + " " + std::to_string(detections[d].id), quad, taken);
   }
+  if (one_family && !detections.empty()) canvas.caption(detections[0].family->name);
   // Encoded here and written as bytes: cv::imwrite tells neither which part failed nor that the disk is full.
   std::vector<u8> png;
   if (!cv::imencode(".png", canvas.picture(), png)) throw Error(path + ": the picture cannot be encoded as PNG");

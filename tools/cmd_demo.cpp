@@ -17,7 +17,7 @@ constexpr const char* kExamples = R"(Examples:
   berth demo --backend opencl --out /tmp/demo
   berth demo --scenario scenarios/rectangle.toml --max-frames 100
 
-Writes into --out: log.jsonl (a JSON line a frame, with the truth), trajectory.svg, last.png.)";
+Writes into --out: log.jsonl (a JSON line a frame, with the truth), trajectory.svg, markers.png.)";
 
 /// The built-in scenario: installed beside the command, or in the source tree it was built from.
 std::string built_in_scenario() {
@@ -64,7 +64,7 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
     const fs::path out(options->out);
     options->stream.log = (out / "log.jsonl").string();
     options->stream.svg = (out / "trajectory.svg").string();
-    options->stream.picture = (out / "last.png").string();
+    options->stream.picture = (out / "markers.png").string();
     console.out() << "scenario    " << scenario << '\n';
     exit_code = run_stream(*source, options->stream, console) > 0 ? kOk : kNoResult;
   });

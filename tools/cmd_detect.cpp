@@ -134,8 +134,7 @@ void detect_one(const std::string& path, const DetectOptions& options, Engine& e
   const std::string refusal = engine.pose_refusal(image.width(), image.height());
   if (!refusal.empty()) console.complain(path + ": " + refusal + " (" + options.engine.camera_file + ")");
   if (draw.wanted()) {
-    write_annotated(draw.path_for(path), image.view(), result.frame.detections, engine.config().camera,
-                    engine.config().marker_size_m);
+    write_annotated(draw.path_for(path), image.view(), result.frame.detections, engine.config().camera);
   }
 }
 

@@ -65,7 +65,7 @@ std::vector<std::string> candidates(const VerifyCommand& command) {
 }
 
 /// Returns whether the backend passed; a backend that is absent fails only where it was asked for or expected.
-bool verify_one(const std::string& name, bool needed, Backend& reference, const VerifyOptions& options,
+bool verify_one(const std::string& name, bool needed, Backend& reference, VerifyOptions& options,
                 const VerifyCommand& command, Console& console) {
   std::unique_ptr<Backend> candidate;
   BackendOptions backend_options;
@@ -77,7 +77,13 @@ bool verify_one(const std::string& name, bool needed, Backend& reference, const 
     console.out() << fmt::format("{:<10} {}  {}\n", name, needed ? "MISSING" : "absent ", error.what()) << std::flush;
     return !needed;
   }
+  if (console.out_is_terminal()) {
+    options.progress = [&](int done, int all) {
+      console.out() << fmt::format("\r{:<10} {} of {}\x1b[K", name, done, all) << std::flush;
+    };
+  }
   const VerifyReport report = verify_backend(*candidate, reference, options);
+  if (console.out_is_terminal()) console.out() << "\r\x1b[K";
   console.out() << fmt::format("{:<10} {}  {} cases, {} frames, {:.1f} s, {}\n", name,
                                report.ok ? "ok     " : "DIFFERS", report.cases, report.frames, report.seconds,
                                candidate->device().name);
@@ -102,7 +108,7 @@ int run_verify(const VerifyCommand& command, Console& console) {
   VerifyOptions options;
   for (const std::string& path : command.images) {
     try {
-      options.images.push_back(read_gray_image(path));
+      options.images.push_back({path, read_gray_image(path)});
     } catch (const Error& error) {
       console.complain(error.what());
     }

@@ -142,7 +142,8 @@ Detector& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) 
   }
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
   DetectorConfig config = config_;
-  if (!pose_refusal(image.width, image.height).empty()) config.camera.reset();
+  if (!(config.marker_size_m > 0) || !pose_refusal(image.width, image.height).empty()) config.camera.reset();
+  if (!config.camera) config.marker_size_m = 0;
   detectors_.insert(detectors_.begin(),
                     {image.width, image.height, Detector(*backend_, image.width, image.height, config)});
   detectors_.front().detector.detect(image, stamp);

@@ -1,5 +1,7 @@
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <exception>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "berth/error.hpp"
 #include "commands.hpp"
@@ -33,8 +35,19 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_run(app, console, exit_code);
   add_verify(app, console, exit_code);
   add_doctor(app, console, exit_code);
+  // What OpenCV has to say about a file, Berth says better.
+  if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError& error) {
+    // CLI11 tells a mistyped command only as the lack of one.
+    const std::string given = argc > 1 ? argv[1] : "";
+    if (app.get_subcommands().empty() && !given.empty() && given[0] != '-') {
+      console.complain("command line: field 'command' is '" + given + "'; use demo, detect, run, verify or doctor");
+    } else {
+      app.exit(error, console.out(), console.err());
+    }
+    return kBadInput;
   } catch (const CLI::ParseError& error) {
     return app.exit(error, console.out(), console.err()) == 0 ? kOk : kBadInput;
   } catch (const Error& error) {

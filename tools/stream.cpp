@@ -122,7 +122,8 @@ class Stream {
       has_truth_ = true;
     }
     if (!options_.svg.empty()) remember_ways(result.detections, frame.truth);
-    if (!options_.picture.empty() && !result.detections.empty()) {
+    if (!options_.picture.empty() && !result.detections.empty() &&
+        result.detections.size() >= picture_detections_.size()) {
       picture_ = frame.image;
       picture_detections_ = result.detections;
     }
@@ -159,22 +160,34 @@ class Stream {
 
   void show(const FrameResult& result, const std::vector<TruthMarker>& truth) {
     const std::size_t n = result.detections.size();
-    std::string line = fmt::format("{} marker{}, {:.3f} ms", n, n == 1 ? "" : "s",
-                                   static_cast<double>(wall_ns_) / 1e6 / static_cast<double>(frames_));
+    std::string line = fmt::format("{:4.0f} fps  {} marker{}", frames_per_second(), n, n == 1 ? " " : "s");
     if (result.status == FrameStatus::overflow) line += ", overflow";
     std::vector<std::string> table;
-    const Detection* nearest = nullptr;
+    const Detection* largest = nullptr;
     for (const Detection& d : result.detections) {
       std::string row =
           fmt::format("  {:<20} {:>4}  ({:7.2f}, {:7.2f}) px", d.family->name, d.id, d.center[0], d.center[1]);
-      if (d.has_pose) {
-        row += "  " + place_of(d, truth);
-        if (nearest == nullptr || d.pose.t[2] < nearest->pose.t[2]) nearest = &d;
-      }
+      if (d.has_pose) row += "  " + place_of(d, truth);
       table.push_back(row);
+      if (largest == nullptr || area_of(d) > area_of(*largest)) largest = &d;
     }
-    if (nearest != nullptr) line += fmt::format("  id {} {}", nearest->id, place_of(*nearest, truth));
+    if (largest != nullptr) line += fmt::format("  id {}", largest->id);
+    if (largest != nullptr && largest->has_pose) line += " " + place_of(*largest, truth);
     view_.show(frames_, line, table);
+  }
+
+  /// Of the detection alone, by the wall clock; 0 before the first frame.
+  double frames_per_second() const {
+    return wall_ns_ > 0 ? static_cast<double>(frames_) * 1e9 / static_cast<double>(wall_ns_) : 0;
+  }
+
+  static double area_of(const Detection& d) {
+    double twice = 0;
+    for (int i = 0; i < 4; ++i) {
+      const std::array<double, 2>&a = d.corners[i], &b = d.corners[(i + 1) % 4];
+      twice += a[0] * b[1] - b[0] * a[1];
+    }
+    return std::abs(twice) / 2;
   }
 
   static std::string place_of(const Detection& d, const std::vector<TruthMarker>& truth) {
@@ -189,14 +202,12 @@ class Stream {
 
   void sum_up(bool by_interrupt) {
     if (by_interrupt) people_ << "interrupted\n";
-    const double frames = static_cast<double>(std::max<std::uint64_t>(frames_, 1));
     people_ << fmt::format("{} frame{}, {} with markers", frames_, frames_ == 1 ? "" : "s", frames_with_markers_);
     if (overflows_ > 0) people_ << fmt::format(", {} overflowed", overflows_);
     if (frames_ > 0) {
+      const auto mean_ms = [&](std::int64_t ns) { return ms_of(ns) / static_cast<double>(frames_); };
       people_ << fmt::format("; detection alone {:.3f} ms a frame ({:.0f} frames/s), {:.3f} ms of processor time",
-                             static_cast<double>(wall_ns_) / 1e6 / frames,
-                             frames * 1e9 / static_cast<double>(std::max<std::int64_t>(wall_ns_, 1)),
-                             static_cast<double>(cpu_ns_) / 1e6 / frames);
+                             mean_ms(wall_ns_), frames_per_second(), mean_ms(cpu_ns_));
     }
     people_ << '\n';
     if (has_truth_) score_.print(people_);
@@ -207,8 +218,8 @@ class Stream {
     }
     if (!options_.svg.empty()) write_svg();
     if (!options_.picture.empty() && !picture_detections_.empty()) {
-      write_annotated(options_.picture, picture_.view(), picture_detections_, std::nullopt, 0);
-      people_ << "last frame  " << options_.picture << '\n';
+      write_annotated(options_.picture, picture_.view(), picture_detections_, engine_->config().camera);
+      people_ << "picture     " << options_.picture << '\n';
     }
     people_.flush();
   }

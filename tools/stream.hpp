@@ -16,7 +16,7 @@ struct StreamOptions {
   std::string log;
   /// Trajectory drawing of the marker seen most often.
   std::string svg;
-  /// Annotated PNG of the last frame that shows a marker.
+  /// Annotated PNG of the last of the frames with the most markers.
   std::string picture;
   bool digests = false;
   /// 0 for all.

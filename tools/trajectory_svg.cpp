@@ -30,14 +30,14 @@ std::string escaped(const std::string& text) {
   return safe;
 }
 
-/// A step of 1, 2 or 5 times a power of ten that cuts the span into about five.
+/// A step of 1, 2 or 5 times a power of ten that cuts the span into four to ten.
 double tick_step(double span) {
-  double step = 1e-6;
-  while (step * 10 < span) step *= 10;
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (span / (step * factor) <= 6) return step * factor;
+  double power = 1e-9;
+  while (power * 10 <= span / 4) power *= 10;
+  for (const double factor : {5.0, 2.0}) {
+    if (power * factor <= span / 4) return power * factor;
   }
-  return step * 10;
+  return power;
 }
 
 struct Range {

@@ -1,0 +1,313 @@
+// The command as a user meets it: what goes to standard output, which files appear, which code it ends with.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <locale>
+#include <opencv2/imgcodecs.hpp>
+
+#include "berth/camera.hpp"
+#include "support/command_run.hpp"
+
+namespace berth {
+namespace {
+
+using nlohmann::json;
+using test::CommandRun;
+using test::run_berth;
+using test::ScratchFolder;
+using test::text_of;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+/// 320 × 200 or so with tag36h11 id 7; see tests/data.
+const std::string kImage = std::string(BERTH_TEST_DATA) + "/tag36h11_7.png";
+
+cv::Size image_size() { return cv::imread(kImage, cv::IMREAD_UNCHANGED).size(); }
+
+/// A camera file for kImage.
+std::string camera_file(const ScratchFolder& folder) {
+  write_camera_info(folder / "cam.yaml", paper_camera(image_size().width, image_size().height));
+  return folder / "cam.yaml";
+}
+
+std::vector<std::string> keys_of(const nlohmann::ordered_json& object) {
+  std::vector<std::string> keys;
+  for (const auto& item : object.items()) keys.push_back(item.key());
+  return keys;
+}
+
+TEST(Command, ExplainsItselfWithExamples) {
+  const CommandRun help = run_berth({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_EQ(help.err, "");
+  for (const char* name : {"demo", "detect", "run", "verify", "doctor"}) {
+    EXPECT_THAT(help.out, HasSubstr(name));
+    const CommandRun command_help = run_berth({name, "--help"});
+    EXPECT_EQ(command_help.exit_code, 0);
+    EXPECT_THAT(command_help.out, HasSubstr("Examples:\n  berth " + std::string(name)));
+  }
+  EXPECT_THAT(run_berth({"--version"}).out, StartsWith("berth "));
+  EXPECT_EQ(run_berth({"--version"}).exit_code, 0);
+}
+
+TEST(Detect, JsonLineHasTheDocumentedFields) {
+  const CommandRun run = run_berth({"detect", "--json", kImage});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.err, "");
+  const auto line = nlohmann::ordered_json::parse(run.out);
+  EXPECT_THAT(keys_of(line), ElementsAre("image", "ms", "detections"));
+  EXPECT_EQ(line["image"], kImage);
+  EXPECT_GT(line["ms"], 0);
+  ASSERT_EQ(line["detections"].size(), 1u);
+  const nlohmann::ordered_json& detection = line["detections"][0];
+  EXPECT_THAT(keys_of(detection), ElementsAre("family", "id", "hamming", "margin", "corners", "center"));
+  EXPECT_EQ(detection["family"], "tag36h11");
+  EXPECT_EQ(detection["id"], 7);
+  EXPECT_EQ(detection["hamming"], 0);
+  ASSERT_EQ(detection["corners"].size(), 4u);
+  // Counter-clockwise on the screen, where y grows downwards: the signed area is negative.
+  double twice_area = 0;
+  for (int i = 0; i < 4; ++i) {
+    const auto& a = detection["corners"][i];
+    const auto& b = detection["corners"][(i + 1) % 4];
+    twice_area += a[0].get<double>() * b[1].get<double>() - b[0].get<double>() * a[1].get<double>();
+  }
+  EXPECT_LT(twice_area, 0);
+}
+
+TEST(Detect, PoseNeedsCameraAndSize) {
+  const ScratchFolder folder;
+  const std::string camera = camera_file(folder);
+  const CommandRun with = run_berth({"detect", "--json", "--camera", camera, "--size", "0.1", kImage});
+  ASSERT_EQ(with.exit_code, 0) << with.err;
+  const json pose = with.lines().at(0)["detections"][0]["pose"];
+  EXPECT_EQ(pose["R"].size(), 9u);
+  ASSERT_EQ(pose["t"].size(), 3u);
+  EXPECT_GT(pose["t"][2], 0);
+  const CommandRun twice = run_berth({"detect", "--json", "--camera", camera, "--size", "0.2", kImage});
+  EXPECT_NEAR(twice.lines().at(0)["detections"][0]["pose"]["t"][2].get<double>(), 2 * pose["t"][2].get<double>(), 1e-9);
+  for (const std::vector<std::string>& half : {std::vector<std::string>{"--camera", camera}, {"--size", "0.1"}}) {
+    std::vector<std::string> arguments = {"detect", "--json", kImage};
+    arguments.insert(arguments.end(), half.begin(), half.end());
+    const CommandRun without = run_berth(arguments);
+    EXPECT_EQ(without.exit_code, 0);
+    EXPECT_FALSE(without.lines().at(0)["detections"][0].contains("pose"));
+    EXPECT_THAT(without.err, HasSubstr("no poses: "));
+  }
+}
+
+TEST(Detect, BackendsPrintTheSameNumbers) {
+  const auto detections = [](const std::string& backend) {
+    const CommandRun run = run_berth({"detect", "--json", "--backend", backend, kImage});
+    EXPECT_EQ(run.exit_code, 0) << backend << ": " << run.err;
+    return run.lines().at(0)["detections"].dump();
+  };
+  const std::string reference = detections("reference");
+  EXPECT_THAT(reference, HasSubstr("\"id\":7"));
+  EXPECT_EQ(detections("simd"), reference);
+  EXPECT_EQ(detections("cpu"), reference);
+}
+
+TEST(Detect, NamesOfEveryKindSurvive) {
+  const ScratchFolder folder;
+  for (const std::string name :
+       {"über.png", "two words.png", "quote\".png", "back\\slash.png", "tab\t.png", "日本.png"}) {
+    std::filesystem::copy_file(kImage, folder / name);
+    const CommandRun run = run_berth({"detect", "--json", folder / name});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    ASSERT_EQ(run.lines().size(), 1u);
+    EXPECT_EQ(run.lines()[0]["image"], folder / name);
+    EXPECT_EQ(run.lines()[0]["detections"].size(), 1u);
+  }
+  std::filesystem::copy_file(kImage, folder / "latin\xe9.png");
+  EXPECT_THAT(run_berth({"detect", "--json", folder / "latin\xe9.png"}).lines().at(0)["image"].get<std::string>(),
+              HasSubstr("latin\xef\xbf\xbd.png"));
+}
+
+TEST(Detect, FolderMeansEveryImageInItByName) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder / "deeper");
+  for (const char* name : {"b.png", "a.png", "deeper/c.png"}) std::filesystem::copy_file(kImage, folder / name);
+  folder.write("notes.txt", std::string("not an image"));
+  const auto images = [](const CommandRun& run) {
+    std::vector<std::string> names;
+    for (const json& line : run.lines()) names.push_back(line["image"]);
+    return names;
+  };
+  EXPECT_THAT(images(run_berth({"detect", "--json", folder.path()})), ElementsAre(folder / "a.png", folder / "b.png"));
+  EXPECT_THAT(images(run_berth({"detect", "--json", "-r", folder.path()})),
+              ElementsAre(folder / "a.png", folder / "b.png", folder / "deeper/c.png"));
+}
+
+TEST(Detect, FamilyListsAreAccepted) {
+  for (const std::vector<std::string>& families :
+       {std::vector<std::string>{"--family", "tag25h9,tag36h11"}, {"--family", "tag25h9", "--family", "tag36h11"}}) {
+    std::vector<std::string> arguments = {"detect", "--json"};
+    arguments.insert(arguments.end(), families.begin(), families.end());
+    arguments.push_back(kImage);
+    const CommandRun run = run_berth(arguments);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.lines().at(0)["detections"].size(), 1u);
+  }
+  EXPECT_TRUE(run_berth({"detect", "--json", "--family", "tag25h9", kImage}).lines().at(0)["detections"].empty());
+}
+
+TEST(Detect, DrawsOnTheImage) {
+  const ScratchFolder folder;
+  const CommandRun run =
+      run_berth({"detect", "--camera", camera_file(folder), "--size", "0.1", "--draw", folder / "seen.png", kImage});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("tag36h11"));
+  const cv::Mat drawn = cv::imread(folder / "seen.png", cv::IMREAD_COLOR);
+  ASSERT_FALSE(drawn.empty());
+  const int factor = drawn.cols / image_size().width;
+  EXPECT_EQ(drawn.size(), image_size() * factor);
+  // Corner 1 has a red dot.
+  const json corner = run_berth({"detect", "--json", kImage}).lines().at(0)["detections"][0]["corners"][0];
+  const auto at = [&](int i) { return static_cast<int>((corner[i].get<double>() + 0.5) * factor); };
+  const cv::Vec3b pixel = drawn.at<cv::Vec3b>(at(1), at(0));
+  EXPECT_GT(pixel[2], 200);
+  EXPECT_LT(pixel[1], 120);
+}
+
+TEST(Detect, DrawsIntoAFolderWithoutOverwriting) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder / "x");
+  std::filesystem::copy_file(kImage, folder / "x/same.png");
+  std::filesystem::copy_file(kImage, folder / "same.png");
+  const CommandRun run = run_berth({"detect", "--draw", folder / "out", folder / "same.png", folder / "x/same.png"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_FALSE(cv::imread(folder / "out/same.png").empty());
+  EXPECT_FALSE(cv::imread(folder / "out/same_2.png").empty());
+}
+
+/// A locale that writes 1234.5 as 1'234,5.
+class OddNumbers : public std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '\''; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
+TEST(Detect, NumbersDoNotDependOnTheLocale) {
+  const ScratchFolder folder;
+  const std::vector<std::string> arguments = {"detect", "--json", "--camera", camera_file(folder),
+                                              "--size", "0.1",    kImage};
+  const json plain = run_berth(arguments).lines().at(0)["detections"];
+  const std::locale before = std::locale::global(std::locale(std::locale::classic(), new OddNumbers));
+  const CommandRun odd = run_berth(arguments);
+  std::locale::global(before);
+  EXPECT_EQ(odd.exit_code, 0) << odd.err;
+  EXPECT_EQ(odd.lines().at(0)["detections"], plain);
+}
+
+TEST(Run, LogsEveryFrameOfAFolder) {
+  const ScratchFolder folder;
+  for (const char* name : {"1.png", "2.png", "3.png"}) std::filesystem::copy_file(kImage, folder / name);
+  folder.write("2b.png", std::string());
+  const CommandRun run = run_berth({"run", "--source", folder.path(), "--json", folder / "log", "--digests"});
+  EXPECT_EQ(run.exit_code, 2) << "the empty file is bad input";
+  EXPECT_THAT(run.err, HasSubstr("2b.png: the file is empty"));
+  EXPECT_THAT(run.out, HasSubstr("3 frames, 3 with markers"));
+  const std::vector<json> log = CommandRun::json_lines(text_of(folder / "log"));
+  ASSERT_EQ(log.size(), 3u);
+  EXPECT_EQ(log[2]["label"], folder / "3.png");
+  EXPECT_EQ(log[2]["status"], "ok");
+  EXPECT_EQ(log[2]["detections"][0]["id"], 7);
+  EXPECT_FALSE(log[2]["digests"].empty());
+  EXPECT_EQ(log[2]["digests"], log[0]["digests"]);
+}
+
+TEST(Run, LogOnStandardOutputIsAllThatIsThere) {
+  const CommandRun run = run_berth({"run", "--source", "file:" + kImage, "--json", "-"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  ASSERT_EQ(run.lines().size(), 1u);
+  EXPECT_EQ(run.lines()[0]["detections"].size(), 1u);
+  EXPECT_THAT(run.err, HasSubstr("1 frame, 1 with markers"));
+}
+
+TEST(Run, EndsAtMaxFrames) {
+  const ScratchFolder folder;
+  for (const char* name : {"1.png", "2.png", "3.png"}) std::filesystem::copy_file(kImage, folder / name);
+  EXPECT_EQ(run_berth({"run", "--source", "dir:" + folder.path(), "--json", "-", "--max-frames", "2"}).lines().size(),
+            2u);
+}
+
+TEST(Demo, LeavesLogDrawingAndPicture) {
+  const ScratchFolder folder;
+  const CommandRun run = run_berth({"demo", "--out", folder / "new/demo", "--max-frames", "3"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("errors against the simulator's truth"));
+  const std::vector<json> log = CommandRun::json_lines(text_of(folder / "new/demo/log.jsonl"));
+  ASSERT_EQ(log.size(), 3u);
+  for (const json& frame : log) {
+    ASSERT_FALSE(frame["truth"].empty());
+    ASSERT_FALSE(frame["detections"].empty());
+    // The estimate of the largest marker is near its truth: 2 % of the range.
+    const json& truth = frame["truth"][0]["pose"]["t"];
+    const json& found = frame["detections"][0]["pose"]["t"];
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(found[i].get<double>(), truth[i].get<double>(), 0.02 * truth[2].get<double>());
+    }
+  }
+  EXPECT_THAT(text_of(folder / "new/demo/trajectory.svg"), StartsWith("<svg "));
+  EXPECT_THAT(text_of(folder / "new/demo/trajectory.svg"), HasSubstr("</svg>"));
+  EXPECT_FALSE(cv::imread(folder / "new/demo/markers.png").empty());
+}
+
+/// Sets an environment variable for one test.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) { setenv(name, value, 1); }
+  ~Environment() { unsetenv(name_); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  const char* name_;
+};
+
+TEST(Verify, OneLineForTheBackendAskedFor) {
+  const CommandRun run = run_berth({"verify", "--backend", "simd", "--image", kImage});
+  EXPECT_EQ(run.exit_code, 0) << run.out << run.err;
+  EXPECT_THAT(run.out, StartsWith("simd       ok "));
+  EXPECT_EQ(std::count(run.out.begin(), run.out.end(), '\n'), 1);
+}
+
+TEST(Verify, FailsWhenAnExpectedBackendIsMissing) {
+  const Environment expect("BERTH_EXPECT", "simd,hovercraft");
+  const CommandRun run = run_berth({"verify", "--backend", "simd"});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.out, HasSubstr("hovercraft MISSING"));
+}
+
+TEST(Doctor, DescribesTheMachine) {
+  const CommandRun text = run_berth({"doctor"});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_THAT(text.out, HasSubstr("kernel cache"));
+  const CommandRun run = run_berth({"doctor", "--json"});
+  ASSERT_EQ(run.exit_code, 0);
+  const json description = json::parse(run.out);
+  ASSERT_FALSE(description["backends"].empty());
+  for (const json& backend : description["backends"]) {
+    // Each backend has a device or a reason, and what is absent is among what is missing.
+    EXPECT_EQ(backend["available"].get<bool>(), !backend["devices"].empty()) << backend;
+    EXPECT_EQ(backend["available"].get<bool>(), !backend.contains("absent")) << backend;
+  }
+  EXPECT_TRUE(description["kernel_cache"]["path"].is_string());
+}
+
+TEST(Doctor, FollowsTheCacheFolder) {
+  const ScratchFolder folder;
+  const Environment cache("XDG_CACHE_HOME", folder.path().c_str());
+  std::filesystem::create_directories(folder / "berth");
+  folder.write("berth/kernel.bin", std::string("12345"));
+  const json description = json::parse(run_berth({"doctor", "--json"}).out);
+  EXPECT_EQ(description["kernel_cache"]["path"], folder / "berth");
+  EXPECT_EQ(description["kernel_cache"]["entries"], 1);
+  EXPECT_EQ(description["kernel_cache"]["bytes"], 5);
+}
+
+}  // namespace
+}  // namespace berth
