@@ -129,7 +129,8 @@ void draw_label(Canvas& canvas, const std::string& label, const Quad& quad, std:
   const double px = std::clamp(0.1 * std::min(box.width, box.height), canvas.text_px(), 3 * canvas.text_px());
   const cv::Size2d size = canvas.text_size(label, px);
   if (size.width < 0.6 * box.width && size.height < 0.2 * box.height) {
-    canvas.text(label, middle, px, kYellow);
+    // In the upper half: the axes go right and down from the middle.
+    canvas.text(label, middle * 0.5 + (quad[0] + quad[3]) * 0.25, px, kYellow);
     return;
   }
   const double gap = 1.6 * px, dx = box.width / 2 + size.width / 2 + gap, dy = box.height / 2 + size.height / 2 + gap;

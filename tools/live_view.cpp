@@ -30,12 +30,13 @@ std::string LiveView::progress(std::size_t done) const {
                      done == 0 ? 0 : elapsed_s / static_cast<double>(done) * static_cast<double>(left));
 }
 
-void LiveView::show(std::size_t done, const std::string& line, const std::vector<std::string>& table) {
+void LiveView::show(std::size_t done, const std::string& line, const std::vector<std::string>& table,
+                    const std::string& brief) {
   const Clock::time_point now = Clock::now();
   if (!terminal_) {
     if (done != 1 && done % plain_every_ != 0 && now - shown_ < std::chrono::seconds(5)) return;
     shown_ = now;
-    out_ << progress(done) << "  " << line << std::endl;
+    out_ << progress(done) << "  " << line << "  " << brief << std::endl;
     return;
   }
   if (done != 1 && (!total_ || done != *total_) && now - shown_ < std::chrono::milliseconds(90)) return;

@@ -14,9 +14,9 @@ class LiveView {
   /// `total` frames where known, for the time left.
   LiveView(std::ostream& out, bool terminal, std::optional<std::size_t> total);
 
-  /// Shows the state after `done` frames: `line` sums it up, `table` goes below it on a terminal. At most some ten
-  /// times a second on a terminal; elsewhere `line` alone, every `plain_every` frames and at least every five seconds.
-  void show(std::size_t done, const std::string& line, const std::vector<std::string>& table);
+  /// Shows the state after `done` frames: the progress and `line`, with `table` below on a terminal, at most some ten
+  /// times a second. Elsewhere one line that ends in `brief`, twenty times in all or every five seconds.
+  void show(std::size_t done, const std::string& line, const std::vector<std::string>& table, const std::string& brief);
   /// Leaves the block standing; what is written to the stream next starts on a line of its own.
   void finish();
 

@@ -164,16 +164,18 @@ class Stream {
     if (result.status == FrameStatus::overflow) line += ", overflow";
     std::vector<std::string> table;
     const Detection* largest = nullptr;
+    std::string brief;
     for (const Detection& d : result.detections) {
-      std::string row =
-          fmt::format("  {:<20} {:>4}  ({:7.2f}, {:7.2f}) px", d.family->name, d.id, d.center[0], d.center[1]);
-      if (d.has_pose) row += "  " + place_of(d, truth);
-      table.push_back(row);
-      if (largest == nullptr || area_of(d) > area_of(*largest)) largest = &d;
+      // A row fits 80 columns: where there is a pose, the place in the image gives way to it.
+      const std::string place =
+          d.has_pose ? place_of(d, truth) : fmt::format("({:7.2f}, {:7.2f}) px", d.center[0], d.center[1]);
+      table.push_back(fmt::format("  {:<14} {:>4}  {}", d.family->name, d.id, place));
+      if (largest == nullptr || area_of(d) > area_of(*largest)) {
+        largest = &d;
+        brief = fmt::format("id {} {}", d.id, place);
+      }
     }
-    if (largest != nullptr) line += fmt::format("  id {}", largest->id);
-    if (largest != nullptr && largest->has_pose) line += " " + place_of(*largest, truth);
-    view_.show(frames_, line, table);
+    view_.show(frames_, line, table, brief);
   }
 
   /// Of the detection alone, by the wall clock; 0 before the first frame.
@@ -192,9 +194,9 @@ class Stream {
 
   static std::string place_of(const Detection& d, const std::vector<TruthMarker>& truth) {
     const std::array<double, 3>& t = d.pose.t;
-    std::string text = fmt::format("x {:+.4f} y {:+.4f} z {:.4f} m", t[0], t[1], t[2]);
+    std::string text = fmt::format("xyz {:+.4f} {:+.4f} {:.4f} m", t[0], t[1], t[2]);
     if (const TruthMarker* marker = truth_of(d, truth)) {
-      text += fmt::format(", off {:.2f} mm {:.3f} deg", distance_m(d.pose, marker->pose) * 1000,
+      text += fmt::format(", off {:.2f} mm {:.2f} deg", distance_m(d.pose, marker->pose) * 1000,
                           angle_deg(d.pose, marker->pose));
     }
     return text;
