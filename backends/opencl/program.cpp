@@ -75,7 +75,8 @@ BuiltProgram build_program(const Api& api, cl_context context, const Device& dev
     if (program.get() != nullptr) return {std::move(program), true};
   }
   Handle<cl_program> program = from_source(api, context, device, source);
-  cache.store(identity, binary_of(api, program.get()));
+  // Asking for the binary can take as long as building (PoCL then compiles every kernel).
+  if (!cache.folder().empty()) cache.store(identity, binary_of(api, program.get()));
   return {std::move(program), false};
 }
 
