@@ -1,7 +1,7 @@
 #include "sim/corpus.hpp"
 
 #include <algorithm>
-#include <functional>
+#include <cmath>
 #include <utility>
 
 #include "berth/error.hpp"
@@ -85,12 +85,12 @@ class Frame {
   }
 
   /// A plane whose middle is at a free place of the image, `side_px` wide for a square of kTag_m seen frontally, tilted
-  /// by up to `tilt_deg` about a random axis and turned at random. `spread` is the radius to keep free over half the
+  /// by `tilt_deg` about a random axis and turned at random. `spread` is the radius to keep free over half the
   /// side. Returns false when no place is found.
-  bool plane(double side_px, double tilt_deg, double spread, Pose& pose) {
+  bool plane(double side_px, Range tilt_deg, double spread, Pose& pose) {
     const CameraModel& camera = scene.camera;
     const double radius = 0.5 * spread * side_px + 3;
-    const double tilt = radians(random.uniform(0, tilt_deg)), axis = random.uniform(0, 2 * kPi);
+    const double tilt = radians(tilt_deg.draw(random)), axis = random.uniform(0, 2 * kPi);
     const double roll = random.uniform(0, 2 * kPi);
     for (int attempt = 0; attempt < 200; ++attempt) {
       const double x = random.uniform(0, 1), y = random.uniform(0, 1);
@@ -128,15 +128,16 @@ class Frame {
     scene.markers.push_back(marker);
   }
 
-  /// Free markers of tag36h11 with different ids.
+  /// A marker of tag36h11 somewhere free; the id differs between the `place` of each of `count` calls.
+  void free_marker(Range side_px, Range tilt_deg, int place, int count) {
+    const double side = side_px.draw_ratio(random);
+    const int id = random.integer(0, 586 / count - 1) * count + place;
+    Pose pose;
+    // The pattern's half diagonal over half the border's side, with margin and plate.
+    if (plane(side, tilt_deg, 2.2, pose)) marker(pose, "tag36h11", id);
+  }
   void free_markers(int count, Range side_px, double tilt_deg) {
-    for (int i = 0; i < count; ++i) {
-      const double side = side_px.draw_ratio(random);
-      const int id = (random.integer(0, 586 / count) * count + i) % 587;
-      Pose pose;
-      // The pattern's half diagonal over half the border's side, with margin and plate.
-      if (plane(side, tilt_deg, 2.2, pose)) marker(pose, "tag36h11", id);
-    }
+    for (int i = 0; i < count; ++i) free_marker(side_px, {0, tilt_deg}, i, count);
   }
 
   /// A marker on the front of a satellite, with the room behind.
@@ -144,7 +145,7 @@ class Frame {
     const double side = std::min(side_px.draw(random), 0.44 * scene.camera.height);
     const int id = random.integer(0, 586);
     Pose pose;
-    if (!plane(side, tilt_deg, 1.9, pose)) throw Error("simulator: the image is too small for the corpus");
+    if (!plane(side, {0, tilt_deg}, 1.9, pose)) throw Error("simulator: the image is too small for the corpus");
     BodyLook look;
     look.seed = random.bits();
     look.albedo = random.uniform(0.2, 0.65);
@@ -205,16 +206,21 @@ void dock(Frame& f, int index) {
 
 void hard(Frame& f, int /*index*/) {
   f.room(34, 0.6);
-  f.light({0.15, 0.5});
-  f.scene.sensor.blur_sigma_px = f.random.uniform(0.5, 1.5);
-  f.scene.sensor.read_noise = f.random.uniform(0.8, 3.7);
+  f.light({0.1, 0.4});
+  f.scene.sensor.blur_sigma_px = f.random.uniform(0.6, 1.5);
+  f.scene.sensor.read_noise = f.random.uniform(1.5, 3.7);
   f.scene.sensor.gamma = f.random.uniform(0.55, 1.7);
-  f.scene.sensor.white_level = f.random.uniform(110, 250);
+  f.scene.sensor.white_level = f.random.uniform(70, 250);
   if (f.random.chance(0.6)) f.shadow();
-  if (f.random.chance(0.2)) f.shadow();
+  if (f.random.chance(0.3)) f.shadow();
   if (f.random.chance(0.5)) f.glare({0.2, 1.2});
-  f.free_markers(f.random.integer(1, 4), {26, 200}, 72);
-  if (f.random.chance(0.6)) f.fingers(f.random.integer(1, 2));
+  // Directions spread over the sphere lean more often than not.
+  const int count = f.random.integer(1, 4);
+  for (int i = 0; i < count; ++i) {
+    const double tilt = 72 * std::sqrt(f.random.uniform(0, 1));
+    f.free_marker({26, 200}, {tilt, tilt}, i, count);
+  }
+  if (f.random.chance(0.6)) f.fingers(f.random.integer(1, 3));
 }
 
 void tiny(Frame& f, int /*index*/) {
@@ -235,13 +241,13 @@ void cluttered(Frame& f, int index) {
     const char* name = kOthers[f.random.integer(0, 6)];
     const int id = f.random.integer(0, std::min<int>(19, static_cast<int>(berth::family(name).codes.size()) - 1));
     Pose pose;
-    if (f.plane(f.random.uniform(30, 90), 45, 2.6, pose)) f.marker(pose, name, id);
+    if (f.plane(f.random.uniform(30, 90), {0, 45}, 2.6, pose)) f.marker(pose, name, id);
   }
   const int decoys = f.random.integer(4, 7);
   for (int i = 0; i < decoys; ++i) {
     const int kind = f.random.chance(0.5) ? 0 : f.random.integer(1, kDecoyKinds - 1);
     Pose pose;
-    if (f.plane(f.random.uniform(30, 90), 45, 2, pose)) {
+    if (f.plane(f.random.uniform(30, 90), {0, 45}, 2, pose)) {
       add_decoy(f.scene.background, pose, shape, kTag_m, kind, f.random);
     }
   }
