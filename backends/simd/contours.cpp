@@ -1,7 +1,9 @@
-// Contours: measured, listed and traced. The work is a chain of dependent loads; what counts is how few there are, so
-// every contour is walked from its first top only and given up as soon as it cannot pass.
+// Contours: measured, listed and traced. The work is a chain of dependent loads; what counts is how few there are. Tops
+// are taken in order, so a walk that meets a node some earlier walk has seen is on a contour with an earlier top and
+// gives up: no node is walked over twice.
 #include <algorithm>
 #include <cstring>
+#include <vector>
 
 #include "reference/layout.hpp"
 #include "simd/simd_ops.hpp"
@@ -21,7 +23,8 @@ HWY_INLINE int node_step(u32 node) { return static_cast<int>(node) >> 16; }
 HWY_INLINE int node_descent(int id, int step) { return (step & 1) != 0 ? 0 : (id & 1) * 2 - 1; }
 
 /// The contour that begins with the top `first`: its number of nodes, or 0 when it is none of ours.
-HWY_INLINE u32 walk(const contour_measure_params& p, const u32* nodes, int first, int top) {
+/// `seen`: nodes of contours of this kind of top that were walked over before.
+HWY_INLINE u32 walk(const contour_measure_params& p, const u32* nodes, int first, int top, u8* seen) {
   const int most_nodes = p.max_side * 5 / 2 + 4;
   const int first_x = node_x(nodes[first]);
   int id = first;
@@ -36,7 +39,8 @@ HWY_INLINE u32 walk(const contour_measure_params& p, const u32* nodes, int first
   do {
     const u32 node = nodes[id];
     const int step = node_step(node);
-    if (id < first && (id & 1) == 0 && step == top) return 0;
+    if (seen[id] != 0) return 0;
+    seen[id] = 1;
     const int x = node_x(node);
     x_min = std::min(x_min, x);
     x_max = std::max(x_max, x);
@@ -62,10 +66,15 @@ void contour_measure(const contour_measure_params& p, const u32* nodes, const u3
   std::memset(spans, 0, static_cast<std::size_t>(p.groups) * kGroupSize * sizeof(u32));
   std::memset(spans + p.totals_at, 0, static_cast<std::size_t>(p.groups) * sizeof(u32));
   std::memset(spans + p.totals_at + p.groups + 1, 0, static_cast<std::size_t>(p.groups) * sizeof(u32));
+  static thread_local std::vector<u8> seen;
+  const std::size_t room = static_cast<std::size_t>(p.capacity);
+  if (seen.size() < 2 * room) seen.resize(2 * room);
+  std::memset(seen.data(), 0, static_cast<std::size_t>(kept));
+  if (p.want_holes != 0) std::memset(seen.data() + room, 0, static_cast<std::size_t>(kept));
   for (int first = 0; first < kept; first += 2) {
     const int top = node_step(nodes[first]);
     if (!((top == 1 && p.want_outer != 0) || (top == -1 && p.want_holes != 0))) continue;
-    const u32 span = walk(p, nodes, first, top);
+    const u32 span = walk(p, nodes, first, top, seen.data() + (top == 1 ? 0 : room));
     if (span == 0) continue;
     const int group = first / 2 / kGroupSize;
     spans[first / 2] = span;
