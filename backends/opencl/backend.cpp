@@ -1,10 +1,7 @@
 // The backend behind OpenCL: a buffer is a cl_mem, a stream an in-order queue, a plan one kernel object a step with its
-// arguments set for good. Setting up throws; from the first enqueue on a failure is remembered by its stream, and
-// Event::wait and Stream::finish report it.
+// arguments set for good. Everything here throws; nothing in stream.cpp does.
 #include <dirent.h>
 #include <sys/stat.h>
-
-#include <cassert>
 
 #include "berth/error.hpp"
 #include "kernel_text.hpp"
@@ -13,6 +10,7 @@
 #include "opencl/devices.hpp"
 #include "opencl/opencl.hpp"
 #include "opencl/program.hpp"
+#include "opencl/stream.hpp"
 
 namespace berth::opencl {
 namespace {
@@ -20,102 +18,6 @@ namespace {
 DeviceInfo info_of(const Device& device) {
   return {device.name, device.platform_name + ", driver " + device.driver_version};
 }
-
-class ClBuffer final : public Buffer {
- public:
-  ClBuffer(std::size_t bytes, cl_context context, Handle<cl_mem> memory)
-      : Buffer(bytes), context_(context), memory_(std::move(memory)) {}
-  cl_context context() const { return context_; }
-  cl_mem memory() const { return memory_.get(); }
-
- private:
-  cl_context context_;
-  Handle<cl_mem> memory_;
-};
-
-cl_mem memory_of(Buffer& buffer) { return static_cast<ClBuffer&>(buffer).memory(); }
-
-struct Launch {
-  Handle<cl_kernel> kernel;
-  std::size_t items;  // a multiple of kGroupSize
-};
-
-class ClPlan final : public Plan {
- public:
-  std::vector<Launch> launches;
-};
-
-class ClEvent final : public Event {
- public:
-  ClEvent(const Api& api, Handle<cl_event> event, bool lost) : api_(api), event_(std::move(event)), lost_(lost) {}
-  bool wait() override {
-    if (lost_) return false;
-    const cl_event event = event_.get();
-    return api_.clWaitForEvents(1, &event) == CL_SUCCESS;
-  }
-
- private:
-  const Api& api_;
-  Handle<cl_event> event_;
-  bool lost_;
-};
-
-class ClStream final : public Stream {
- public:
-  ClStream(const Api& api, Handle<cl_command_queue> queue) : api_(api), queue_(std::move(queue)) {}
-  // The host's memory may be in use until then.
-  ~ClStream() override { api_.clFinish(queue_.get()); }
-
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override {
-    assert(bytes <= buffer.bytes());
-    if (bytes == 0) return;
-    note(api_.clEnqueueWriteBuffer(queue_.get(), memory_of(buffer), CL_FALSE, 0, bytes, data, 0, nullptr, nullptr));
-  }
-
-  void download(Buffer& buffer, void* data, std::size_t bytes) override {
-    assert(bytes <= buffer.bytes());
-    if (bytes == 0) return;
-    note(api_.clEnqueueReadBuffer(queue_.get(), memory_of(buffer), CL_FALSE, 0, bytes, data, 0, nullptr, nullptr));
-  }
-
-  void replay(Plan& plan) override {
-    static constexpr std::size_t kGroup = kGroupSize;
-    for (const Launch& launch : static_cast<ClPlan&>(plan).launches) {
-      note(api_.clEnqueueNDRangeKernel(queue_.get(), launch.kernel.get(), 1, nullptr, &launch.items, &kGroup, 0,
-                                       nullptr, nullptr));
-    }
-    note(api_.clFlush(queue_.get()));  // or a driver may keep it all to itself until someone waits
-  }
-
-  std::unique_ptr<Event> record_event() override {
-    Handle<cl_event> event = mark();
-    return std::make_unique<ClEvent>(api_, std::move(event), lost_);
-  }
-
-  bool finish() override {
-    // clFinish alone would not tell whether what it waited for went well.
-    const Handle<cl_event> last = mark();
-    if (lost_) return false;
-    const cl_event event = last.get();
-    note(api_.clWaitForEvents(1, &event));
-    return !lost_;
-  }
-
- private:
-  Handle<cl_event> mark() {
-    cl_event event = nullptr;
-    note(api_.clEnqueueMarkerWithWaitList(queue_.get(), 0, nullptr, &event));
-    note(api_.clFlush(queue_.get()));
-    return {event, api_.clReleaseEvent};
-  }
-
-  /// Whatever fails on a running stream ends it: the arguments were checked before.
-  void note(cl_int status) { lost_ = lost_ || status != CL_SUCCESS; }
-
-  const Api& api_;
-  Handle<cl_command_queue> queue_;
-  bool lost_ = false;
-};
 
 class ClBackend final : public Backend {
  public:
@@ -151,7 +53,7 @@ class ClBackend final : public Backend {
     return std::make_unique<ClBuffer>(bytes, context_.get(), std::move(memory));
   }
 
-  std::unique_ptr<Stream> make_stream() override { return std::make_unique<ClStream>(api_, make_queue()); }
+  std::unique_ptr<Stream> make_stream() override { return opencl::make_stream(api_, make_queue()); }
 
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
     auto plan = std::make_unique<ClPlan>();
