@@ -54,21 +54,25 @@ void add_item(std::vector<Surface>& surfaces, const Pose& wall, double x, double
       break;
     case 1:
     case 2: {  // a cable or a pipe
-      Surface cable = flat(wall, x, y, random.uniform(0.6, 3), random.uniform(0.008, 0.05), albedo);
-      surfaces.push_back(turned(cable, angle));
+      const double length = random.uniform(0.6, 3), width = random.uniform(0.008, 0.05);
+      surfaces.push_back(turned(flat(wall, x, y, length, width, albedo), angle));
       break;
     }
-    case 3:
-      surfaces.push_back(turned(lettering(wall, x, y, random.uniform(0.03, 0.12), random.integer(3, 12),
-                                          random.uniform(0.03, 0.2), random.uniform(0.5, 0.85), random),
-                                angle));
+    case 3: {
+      const double height = random.uniform(0.03, 0.12);
+      const int letters = random.integer(3, 12);
+      const double ink = random.uniform(0.03, 0.2), ground = random.uniform(0.5, 0.85);
+      surfaces.push_back(turned(lettering(wall, x, y, height, letters, ink, ground, random), angle));
       break;
-    case 4:
-      surfaces.push_back(turned(chequered(wall, x, y, random.uniform(0.1, 0.4), random.uniform(0.1, 0.4),
-                                          random.integer(2, 9), random.integer(2, 9), random.uniform(0.5, 0.85),
-                                          random.uniform(0.04, 0.3), random.chance(0.5) ? &random : nullptr),
-                                angle));
+    }
+    case 4: {
+      const double width = random.uniform(0.1, 0.4), height = random.uniform(0.1, 0.4);
+      const int columns = random.integer(2, 9), rows = random.integer(2, 9);
+      const double light = random.uniform(0.5, 0.85), dark = random.uniform(0.04, 0.3);
+      Random* const shuffle = random.chance(0.5) ? &random : nullptr;
+      surfaces.push_back(turned(chequered(wall, x, y, width, height, columns, rows, light, dark, shuffle), angle));
       break;
+    }
     case 5: {
       const double radius = random.uniform(0.03, 0.25);
       surfaces.push_back(disc(wall, x, y, radius, random.chance(0.4) ? radius * random.uniform(0.5, 0.9) : 0, albedo));

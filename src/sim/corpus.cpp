@@ -27,7 +27,8 @@ struct Place {
   double radius;
 };
 
-// Builds one frame. Draws everything from one sequence, so the order of the calls is part of the corpus.
+// Builds one frame. Draws everything from one sequence, so the order of the draws is part of the corpus: never two in
+// the arguments of one call, which compilers evaluate in different orders (braces and statements keep theirs).
 class Frame {
  public:
   Frame(u64 seed, const CameraModel& camera) : random(seed) {
@@ -40,20 +41,26 @@ class Frame {
     const double depth = random.uniform(2.2, 4.0);
     const double aspect = static_cast<double>(scene.camera.height) / scene.camera.width;
     Pose wall = translation(0, 0, depth);
-    wall.R =
-        rotation(radians(random.uniform(-12, 12)), radians(random.uniform(-18, 18)), radians(random.uniform(-8, 8)));
+    wall.R = turn({12, 18, 8});
     const double width = 1.15 * depth * scene.camera.width / scene.camera.fx;
     add_wall(scene.background, wall, width, width * aspect, items, random);
     if (random.chance(body_chance)) {
-      Pose body = translation(random.uniform(-0.5, 0.5), random.uniform(-0.4, 0.4), random.uniform(1.4, 2.1));
-      body.R = rotation(radians(random.uniform(-40, 40)), radians(random.uniform(-40, 40)),
-                        radians(random.uniform(-180, 180)));
+      Pose body;
+      body.t = {random.uniform(-0.5, 0.5), random.uniform(-0.4, 0.4), random.uniform(1.4, 2.1)};
+      body.R = turn({40, 40, 180});
       BodyLook look;
       look.seed = random.bits();
       look.albedo = random.uniform(0.25, 0.6);
       look.ring = random.chance(0.6);
       add_body(scene.background, body, look);
     }
+  }
+
+  /// A rotation by up to ± these angles about x, y and z.
+  Mat3 turn(const Vec3& most_deg) {
+    Vec3 angles{};
+    for (std::size_t i = 0; i < 3; ++i) angles[i] = radians(random.uniform(-most_deg[i], most_deg[i]));
+    return rotation(angles[0], angles[1], angles[2]);
   }
 
   void light(Range ambient) {
@@ -152,8 +159,8 @@ class Frame {
     look.ring = random.chance(0.6);
     look.width_m = random.uniform(0.38, 0.56);
     look.height_m = random.uniform(0.36, 0.46);
-    add_body(scene.background, compose(pose, translation(random.uniform(-0.04, 0.04), random.uniform(-0.04, 0.04), 0)),
-             look);
+    const Vec2 off = {random.uniform(-0.04, 0.04), random.uniform(-0.04, 0.04)};
+    add_body(scene.background, compose(pose, translation(off[0], off[1], 0)), look);
     marker(pose, "tag36h11", id);
   }
 
@@ -171,7 +178,8 @@ class Frame {
       // From the outside in.
       const double outward = tip[0] >= 0 ? 0 : kPi;
       const double angle = outward + radians(random.uniform(-70, 70));
-      add_finger(scene.foreground, tip, angle, random.uniform(0.03, 0.08), 0.16, random.uniform(0.08, 0.45));
+      const double width = random.uniform(0.03, 0.08), albedo = random.uniform(0.08, 0.45);
+      add_finger(scene.foreground, tip, angle, width, 0.16, albedo);
     }
   }
 
@@ -195,9 +203,9 @@ void dock(Frame& f, int index) {
   f.room(30, 0);
   f.light({0.35, 0.5});
   f.scene.sensor.white_level = f.random.uniform(190, 225);
-  Pose body = translation(0.07 * range * f.random.uniform(-1, 1), 0.05 * range * f.random.uniform(-1, 1), range);
-  body.R =
-      rotation(radians(f.random.uniform(-8, 8)), radians(f.random.uniform(-8, 8)), radians(f.random.uniform(-12, 12)));
+  Pose body;
+  body.t = {0.07 * range * f.random.uniform(-1, 1), 0.05 * range * f.random.uniform(-1, 1), range};
+  body.R = f.turn({8, 8, 12});
   BodyLook look;
   look.seed = 3;
   add_body(f.scene.background, body, look);
