@@ -123,16 +123,17 @@ void print_table(const std::string& title, const std::vector<Frame>& frames, con
   fmt::print("\n**{}**, {} frames of {}×{}\n\n", title, frames.size(), frames.front().image.width(),
              frames.front().image.height());
   if (has_truth) {
-    fmt::print("| engine | recall % | of | partly seen | false | corner RMS px | ms median | ms p95 | time against {} |\n",
-               results.front().engine);
+    fmt::print(
+        "| engine | recall % | of | partly seen | false | corner RMS px | ms median | ms p95 | time against {} |\n",
+        results.front().engine);
     fmt::print("|---|---|---|---|---|---|---|---|---|\n");
   } else {
-    fmt::print("| engine | found | ms median | ms p95 | time against {} |\n|---|---|---|---|---|\n", results.front().engine);
+    fmt::print("| engine | found | ms median | ms p95 | time against {} |\n|---|---|---|---|---|\n",
+               results.front().engine);
   }
   for (const Result& r : results) {
     const double median = quantile(r.ms, 0.5);
-    const std::string times =
-        fmt::format("{:.3f} | {:.3f} | {:.1f} |\n", median, quantile(r.ms, 0.95), median / base);
+    const std::string times = fmt::format("{:.3f} | {:.3f} | {:.1f} |\n", median, quantile(r.ms, 0.95), median / base);
     if (has_truth) {
       fmt::print("| {} | {:.1f} | {} | {} | {} | {:.4f} | {}", r.engine, 100 * r.score.recall(), r.score.required,
                  r.score.extra, r.score.false_positives, r.score.corner_rms_px(), times);

@@ -11,7 +11,7 @@ namespace berth::bench {
 struct Score {
   int required = 0;  // markers fully visible
   int recalled = 0;
-  int extra = 0;        // partly visible ones found: neither asked for nor wrong
+  int extra = 0;  // partly visible ones found: neither asked for nor wrong
   int false_positives = 0;
   double square_error = 0;  // of the recalled markers' corners, px^2
   int corners = 0;

@@ -3,6 +3,7 @@
 #include "runs.h"
 
 #include "flat_field.inl"
+#include "halve.inl"
 #include "tile_extrema.inl"
 #include "tile_histogram.inl"
 #include "normalize.inl"

@@ -20,11 +20,11 @@ BODY
       const int side = GROUP * QUAD_WORDS + QUAD_SIDE + (LID >> 5) * QUAD_SIDE_WORDS;
       const int station = LID & 31;
       const bool upright = (quads[side] & 1) == 0;
-      const int u_ref = quads[side] >> 1;
-      const int v_ref = quads[side + 1];
+      const int u_ref = (quads[side] >> 1) * p.scale;
+      const int v_ref = quads[side + 1] * p.scale;
       const int slope = quads[side + 2];
-      const int u_from = quads[side + 3];
-      const int u_to = quads[side + 4];
+      const int u_from = quads[side + 3] * p.scale;
+      const int u_to = quads[side + 4] * p.scale;
       const int low = min(u_from, u_to);
       const int length = max(u_from, u_to) - low;
       const int trim = side_trim(length);
@@ -69,9 +69,11 @@ BODY
       if (LID < 4) {
         const int side = GROUP * QUAD_WORDS + QUAD_SIDE + LID * QUAD_SIDE_WORDS;
         const int edge = GROUP * EDGE_WORDS + LID * EDGE_SIDE_WORDS;
-        const int halvings = side_halvings(max(quads[side + 3], quads[side + 4]) - min(quads[side + 3], quads[side + 4]));
-        const int u_ref = quads[side] >> 1;
-        const int u_middle = (quads[side + 3] + quads[side + 4]) / 2;
+        const int u_from = quads[side + 3] * p.scale;
+        const int u_to = quads[side + 4] * p.scale;
+        const int halvings = side_halvings(max(u_from, u_to) - min(u_from, u_to));
+        const int u_ref = (quads[side] >> 1) * p.scale;
+        const int u_middle = (u_from + u_to) / 2;
         int used = 0;
         int residual = 0;
         int slope = 0;
@@ -114,7 +116,7 @@ BODY
         const int tilt = used == 0 ? 0 : divide_rounded(slope, 4 * (1 << halvings));
         const int from_mean = ((u_ref - u_middle) >> halvings) - mean_u;
         const int at_ref = used == 0 ? 0 : divide_rounded(slope * max(-2048, min(2048, from_mean)), 256);
-        edges[edge] = quads[side + 1] + (used == 0 ? 0 : value + at_ref);
+        edges[edge] = quads[side + 1] * p.scale + (used == 0 ? 0 : value + at_ref);
         edges[edge + 1] = quads[side + 2] + tilt;
         edges[edge + 2] = used;
         edges[edge + 3] = residual;

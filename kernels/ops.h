@@ -16,6 +16,7 @@
 
 #define BERTH_OPS(X) \
   X(flat_field)      \
+  X(halve)           \
   X(tile_extrema)    \
   X(tile_histogram)  \
   X(normalize)       \
@@ -33,6 +34,13 @@
 
 struct flat_field_params {
   int words; /* pixel words */
+};
+
+struct halve_params {
+  int row_words; /* pixel words in a row of the image: padded_width / 4 */
+  int rows;      /* padded_height */
+  int half_row_words;
+  int half_rows;
 };
 
 struct tile_extrema_params {
@@ -128,6 +136,7 @@ struct quad_fit_params {
 };
 
 struct edge_refine_params {
+  int scale; /* pixels a pixel of the image that the quadrilaterals were found in: 1, or 2 for the halved one */
   int width;
   int height;
   int row_words; /* pixel words in a row: padded_width / 4 */
@@ -146,7 +155,8 @@ struct edge_refine_params {
 #define QUAD_SIDE 4       /* where side 0 begins; words 1 … 3 are nodes, area (px^2) and the greatest side (px) */
 #define QUAD_SIDE_WORDS 5 /* axis | u_ref << 1, v_ref, slope, u_first, u_last: see quad_fit */
 
-/* Words of a quadrilateral's refined sides in `edges`: v_ref, slope, stations used, residual. */
+/* Words of a quadrilateral's refined sides in `edges`, in the whole image whatever the scale: v_ref (at scale times
+   the quadrilateral's u_ref), slope, stations used, residual. */
 #define EDGE_WORDS 16
 #define EDGE_SIDE_WORDS 4
 

@@ -32,12 +32,12 @@ void check_host_device(const char* name, const BackendOptions& options) {
 
 const std::vector<std::string>& backend_names() {
   static const std::vector<std::string> names = {
-      "simd",
-      "cpu",
+    "simd",
+    "cpu",
 #if BERTH_WITH_OPENCL
-      "opencl",
+    "opencl",
 #endif
-      "reference",
+    "reference",
   };
   return names;
 }
@@ -61,7 +61,8 @@ std::unique_ptr<Backend> open_backend(const std::string& name, const BackendOpti
   }
   if (name == "simd") {
     check_host_device("simd", options);
-    return host::make_host_backend("simd", processor(simd_backend::target_name()), simd_backend::ops(), options.threads);
+    return host::make_host_backend("simd", processor(simd_backend::target_name()), simd_backend::ops(),
+                                   options.threads);
   }
   if (name == "cpu") {
     check_host_device("cpu", options);

@@ -14,9 +14,8 @@ namespace {
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 namespace kernel {
-#include "prelude/cpu.h"
-
 #include "all.inl"
+#include "prelude/cpu.h"
 }  // namespace kernel
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic pop
@@ -45,12 +44,12 @@ struct Groups<void(const P&, T*...)> {
 
 host::HostOps ops() {
   host::HostOps table;
-#define X(op)                                                                              \
-  table.ops[static_cast<std::size_t>(Op::op)] = {                                          \
-      [](const void* params, void* const* buffers, int first, int last) {                  \
-        Groups<decltype(reference::op)>::run(&kernel::op, params, buffers, first, last);   \
-      },                                                                                   \
-      false};
+#define X(op)                                                                                                         \
+  table.ops[static_cast<std::size_t>(Op::op)] = {[](const void* params, void* const* buffers, int first, int last) {  \
+                                                   Groups<decltype(reference::op)>::run(&kernel::op, params, buffers, \
+                                                                                        first, last);                 \
+                                                 },                                                                   \
+                                                 false};
   BERTH_OPS(X)
 #undef X
   return table;

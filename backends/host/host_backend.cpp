@@ -55,9 +55,7 @@ class HostEvent final : public Event {
 class HostStream final : public Stream {
  public:
   explicit HostStream(WorkerPool& pool) : pool_(pool) {}
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override {
-    std::memcpy(buffer.host(), data, bytes);
-  }
+  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { std::memcpy(buffer.host(), data, bytes); }
   void download(Buffer& buffer, void* data, std::size_t bytes) override { std::memcpy(data, buffer.host(), bytes); }
   void replay(Plan& plan) override {
     for (const Call& call : static_cast<HostPlan&>(plan).calls) {
@@ -88,7 +86,8 @@ class HostBackend final : public Backend {
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
     auto plan = std::make_unique<HostPlan>();
     for (const Step& step : steps) {
-      Call call{ops_.ops[static_cast<std::size_t>(step.op)], step.params, {}, (step.items + kGroupSize - 1) / kGroupSize};
+      Call call{
+          ops_.ops[static_cast<std::size_t>(step.op)], step.params, {}, (step.items + kGroupSize - 1) / kGroupSize};
       for (Buffer* buffer : step.buffers) call.buffers.push_back(buffer->host());
       plan->calls.push_back(std::move(call));
     }

@@ -1,16 +1,16 @@
-#include "reference/reference.hpp"
 #include "reference_backend.hpp"
+
+#include "reference/reference.hpp"
 #include "signature.hpp"
 
 namespace berth::reference_backend {
 
 host::HostOps ops() {
   host::HostOps table;
-#define X(op)                                                                                          \
-  table.ops[static_cast<std::size_t>(Op::op)] = {[](const void* params, void* const* buffers, int, int) { \
-                                                   signature::call(&reference::op, params, buffers);   \
-                                                 },                                                    \
-                                                 true};
+#define X(op)                                                                                                       \
+  table.ops[static_cast<std::size_t>(Op::op)] = {                                                                   \
+      [](const void* params, void* const* buffers, int, int) { signature::call(&reference::op, params, buffers); }, \
+      true};
   BERTH_OPS(X)
 #undef X
   return table;

@@ -142,8 +142,7 @@ BERTH_SIMD_DISPATCH(contour_measure,
 BERTH_SIMD_DISPATCH(contour_collect,
                     (const contour_collect_params& p, const u32* spans, const u32* offsets, u32* contours),
                     (p, spans, offsets, contours))
-BERTH_SIMD_DISPATCH(contour_trace,
-                    (const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points),
+BERTH_SIMD_DISPATCH(contour_trace, (const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points),
                     (p, nodes, contours, points))
 }  // namespace berth::simd_backend
 #endif

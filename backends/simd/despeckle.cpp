@@ -25,7 +25,8 @@ void despeckle(const despeckle_params& p, const u32* bits, u32* clean) {
     const auto scalar = [&](int x) {
       const u32 left = x > 0 ? here[x - 1] >> 31 : 0u;
       const u32 right = x + 1 < p.row_words ? here[x + 1] << 31 : 0u;
-      out[x] = here[x] & ((here[x] << 1) | left | (here[x] >> 1) | right | (above[x] & has_above) | (below[x] & has_below));
+      out[x] =
+          here[x] & ((here[x] << 1) | left | (here[x] >> 1) | right | (above[x] & has_above) | (below[x] & has_below));
     };
     scalar(0);
     int x = 1;

@@ -26,8 +26,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// Points of one contour, twice over so that arcs may pass the first point, with room for a vector's overhang.
 struct Points {
   std::vector<s32> x;
-  std::vector<s32> y;           // row centres
-  std::vector<s32> boundary;    // the row boundary the walk follows after the point
+  std::vector<s32> y;         // row centres
+  std::vector<s32> boundary;  // the row boundary the walk follows after the point
   s32 area = 0;
   s32 x_min = 0, x_max = 0, y_min = 0, y_max = 0;
 
@@ -148,8 +148,8 @@ class Quad {
   }
 
   HWY_ATTR bool find_vertices() {
-    const Farthest a = farthest_from(points_, count_, (points_.x_min + points_.x_max) / 2,
-                                     (points_.y_min + points_.y_max) / 2);
+    const Farthest a =
+        farthest_from(points_, count_, (points_.x_min + points_.x_max) / 2, (points_.y_min + points_.y_max) / 2);
     const int first = std::max(a.index, 0);
     const int other = std::max(farthest_from(points_, count_, x(first), y(first)).index, 0);
     if (first == other) return false;
@@ -257,7 +257,8 @@ class Quad {
         if ((x(i + 1) > x(i)) != rightward) continue;
         const s32 v = (points_.boundary[static_cast<std::size_t>(i)] - s.v_middle) >> s.halvings;
         const s32 end = std::min(std::max(x(i), x(i + 1)), last + 1);
-        for (s32 u = std::max(std::min(x(i), x(i + 1)), first) | 1; u < end; u += 2) add((u - s.u_middle) >> s.halvings, v);
+        for (s32 u = std::max(std::min(x(i), x(i + 1)), first) | 1; u < end; u += 2)
+          add((u - s.u_middle) >> s.halvings, v);
       }
     }
     sums[0] = n;

@@ -82,7 +82,8 @@ HWY_INLINE void set_step(u32* nodes, u32 id, u32 next) {
 
 // The overlaps of one row's runs with those of the row above, in raster order. Ranks among the run starts of a word are
 // popcounts, so the runs of an overlap are known without looking at their ends.
-HWY_INLINE void link_rows(const u32* above, const u32* here, int row_words, u32 above_begin, u32 here_begin, u32* nodes) {
+HWY_INLINE void link_rows(const u32* above, const u32* here, int row_words, u32 above_begin, u32 here_begin,
+                          u32* nodes) {
   u64 above_carry = 0;
   u64 here_carry = 0;
   u64 both_carry = 0;

@@ -10,6 +10,7 @@ namespace berth::simd_backend {
 
 // Every operation that has row code; the kernel text does the rest.
 #define BERTH_SIMD_OPS(X) \
+  X(halve)                \
   X(tile_extrema)         \
   X(tile_histogram)       \
   X(threshold)            \
@@ -25,11 +26,10 @@ namespace berth::simd_backend {
 
 host::HostOps ops() {
   host::HostOps table = cpu_backend::ops();
-#define X(op)                                                                                               \
-  table.ops[static_cast<std::size_t>(Op::op)] = {[](const void* params, void* const* buffers, int, int) {   \
-                                                   signature::call(&simd_backend::op, params, buffers);     \
-                                                 },                                                         \
-                                                 true};
+#define X(op)                                                                                                          \
+  table.ops[static_cast<std::size_t>(Op::op)] = {                                                                      \
+      [](const void* params, void* const* buffers, int, int) { signature::call(&simd_backend::op, params, buffers); }, \
+      true};
   BERTH_SIMD_OPS(X)
 #undef X
   return table;

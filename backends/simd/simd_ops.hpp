@@ -7,6 +7,7 @@
 /// here and picks one at run time.
 namespace berth::simd_backend {
 
+void halve(const halve_params& p, const u32* pixels, u32* half_pixels);
 void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, u32* maxima);
 void tile_histogram(const tile_histogram_params& p, const u32* minima, const u32* maxima, u32* histograms);
 void threshold(const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima, const u32* levels,
@@ -24,6 +25,6 @@ void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* leve
 }  // namespace berth::simd_backend
 
 /// Defines the dispatching function of an operation; its arguments, then their names in parentheses.
-#define BERTH_SIMD_DISPATCH(op, parameters, arguments)          \
-  HWY_EXPORT(op);                                               \
+#define BERTH_SIMD_DISPATCH(op, parameters, arguments) \
+  HWY_EXPORT(op);                                      \
   void op parameters { HWY_DYNAMIC_DISPATCH(op) arguments; }

@@ -32,8 +32,9 @@ void find_limits(TileRow& row, const u8* const (&low)[3], const u8* const (&high
   const hn::ScalableTag<u8> bytes;
   const std::size_t lanes = hn::Lanes(bytes);
   for (std::size_t x = 0; x < tiles; x += lanes) {
-    hn::StoreU(hn::Min(hn::Min(hn::LoadU(bytes, low[0] + x), hn::LoadU(bytes, low[1] + x)), hn::LoadU(bytes, low[2] + x)),
-               bytes, row.low + kMargin + x);
+    hn::StoreU(
+        hn::Min(hn::Min(hn::LoadU(bytes, low[0] + x), hn::LoadU(bytes, low[1] + x)), hn::LoadU(bytes, low[2] + x)),
+        bytes, row.low + kMargin + x);
     hn::StoreU(
         hn::Max(hn::Max(hn::LoadU(bytes, high[0] + x), hn::LoadU(bytes, high[1] + x)), hn::LoadU(bytes, high[2] + x)),
         bytes, row.high + kMargin + x);

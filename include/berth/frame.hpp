@@ -37,7 +37,7 @@ struct StageTime {
 
 /// Hash of one stage's output; equal on every backend for equal input.
 struct StageDigest {
-  const char* stage = "";
+  std::string stage;
   u64 digest = 0;
 };
 
@@ -48,7 +48,8 @@ struct FrameResult {
   std::vector<Detection> detections;
   /// Quadrilaterals that were examined for a code.
   int quads = 0;
-  std::array<CapacityUse, 3> capacities = {};
+  /// Run ends, contours and points of the whole image, then of the halved one.
+  std::array<CapacityUse, 6> capacities = {};
   /// device: upload to download; decode; pose
   std::array<StageTime, 3> times = {};
   /// Filled only when the detector is asked for digests.

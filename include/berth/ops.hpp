@@ -36,9 +36,9 @@ constexpr int kGroupSize = 128;
 /// The operation whose parameter struct P is; the struct picks the operation at the call.
 template <class P>
 struct OpOf;
-#define X(op)                          \
-  template <>                          \
-  struct OpOf<op##_params> {           \
+#define X(op)                           \
+  template <>                           \
+  struct OpOf<op##_params> {            \
     static constexpr Op value = Op::op; \
   };
 BERTH_OPS(X)

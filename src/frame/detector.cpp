@@ -44,24 +44,63 @@ std::vector<const MarkerFamily*> find_families(const std::vector<std::string>& n
   return families;
 }
 
+/// One level's results on the host: in the device's memory where the host reaches it, downloaded otherwise.
+class LevelResult {
+ public:
+  explicit LevelResult(const MarkerLevel& level) : level_(level) {
+    if (level.quads->host() != nullptr) return;
+    contours_.resize(level.contours->bytes() / 4);
+    quads_.resize(level.quads->bytes() / 4);
+    edges_.resize(level.edges->bytes() / 4);
+  }
+  void download(Stream& stream) {
+    if (quads_.empty()) return;
+    stream.download(*level_.contours, contours_.data(), contours_.size() * 4);
+    stream.download(*level_.quads, quads_.data(), quads_.size() * 4);
+    stream.download(*level_.edges, edges_.data(), edges_.size() * 4);
+  }
+
+  int slots() const { return level_.geometry.max_contours; }
+  /// Whether slot i holds a quadrilateral; `found` tells whether it has four corners.
+  bool quad(int i, QuadCandidate& candidate, bool& found) const {
+    const s32* quad = (quads_.empty() ? static_cast<const s32*>(level_.quads->host()) : quads_.data()) + i * QUAD_WORDS;
+    const s32* edge = (edges_.empty() ? static_cast<const s32*>(level_.edges->host()) : edges_.data()) + i * EDGE_WORDS;
+    if ((quad[0] & QUAD_VALID) == 0) return false;
+    found = to_candidate(quad, edge, level_.scale, candidate);
+    return true;
+  }
+  void note_capacities(CapacityUse* use) const {
+    const u32* header = contours_.empty() ? static_cast<const u32*>(level_.contours->host()) : contours_.data();
+    const MarkerGeometry& g = level_.geometry;
+    const bool whole = level_.scale == 1;
+    use[0] = {whole ? "run_ends" : "half_run_ends", header[0], static_cast<u32>(g.max_run_ends)};
+    use[1] = {whole ? "contours" : "half_contours", header[1], static_cast<u32>(g.max_contours)};
+    use[2] = {whole ? "points" : "half_points", header[2], static_cast<u32>(g.max_points)};
+  }
+
+ private:
+  const MarkerLevel& level_;
+  std::vector<u32> contours_;
+  std::vector<s32> quads_;
+  std::vector<s32> edges_;
+};
+
 }  // namespace
 
 struct Detector::Impl {
   Impl(Backend& backend, int width, int height, const DetectorConfig& user_config)
       : config(user_config),
         decoder(find_families(config.families), config.max_hamming),
-        plan(backend, MarkerGeometry(width, height, config.capacities), config),
+        plan(backend, width, height, config),
         stream(backend.make_stream()) {
     if (config.camera && !(config.marker_size_m > 0)) {
       throw Error("marker size is " + std::to_string(config.marker_size_m) + " m; give the side that the corners span");
     }
-    const MarkerGeometry& g = plan.geometry();
-    const std::size_t slots = static_cast<std::size_t>(g.max_contours);
-    if (plan.frame().host() == nullptr) staging.resize(g.frame_bytes());
-    if (plan.quads().host() == nullptr) {
-      contours.resize(plan.contours().bytes() / 4);
-      quads.resize(slots * QUAD_WORDS);
-      edges.resize(slots * EDGE_WORDS);
+    if (plan.frame().host() == nullptr) staging.resize(plan.geometry().frame_bytes());
+    std::size_t slots = 0;
+    for (const MarkerLevel& level : plan.levels()) {
+      levels.emplace_back(level);
+      slots += static_cast<std::size_t>(level.geometry.max_contours);
     }
     result.detections.reserve(slots);
   }
@@ -79,15 +118,10 @@ struct Detector::Impl {
     pad_frame(image, g, frame());
     if (!staging.empty()) stream->upload(plan.frame(), staging.data(), staging.size());
     stream->replay(plan.plan());
-    if (!quads.empty()) {
-      stream->download(plan.contours(), contours.data(), contours.size() * 4);
-      stream->download(plan.quads(), quads.data(), quads.size() * 4);
-      stream->download(plan.edges(), edges.data(), edges.size() * 4);
-    }
+    for (LevelResult& level : levels) level.download(*stream);
   }
 
   const FrameResult& collect() {
-    const MarkerGeometry& g = plan.geometry();
     result.detections.clear();
     result.digests.clear();
     result.quads = 0;
@@ -97,9 +131,8 @@ struct Detector::Impl {
       result.status = FrameStatus::device_lost;
       return result;
     }
-    const u32* header = contours.empty() ? static_cast<const u32*>(plan.contours().host()) : contours.data();
-    decode(quads.empty() ? static_cast<const s32*>(plan.quads().host()) : quads.data(),
-           edges.empty() ? static_cast<const s32*>(plan.edges().host()) : edges.data());
+    for (const LevelResult& level : levels) decode(level);
+    resolve_duplicates(result.detections);
     const Clock::time_point decoded = Clock::now();
     if (config.camera) {
       for (Detection& detection : result.detections) {
@@ -107,12 +140,10 @@ struct Detector::Impl {
       }
     }
     const Clock::time_point posed = Clock::now();
-    result.capacities = {CapacityUse{"run_ends", header[0], static_cast<u32>(g.max_run_ends)},
-                         CapacityUse{"contours", header[1], static_cast<u32>(g.max_contours)},
-                         CapacityUse{"points", header[2], static_cast<u32>(g.max_points)}};
-    result.times = {StageTime{"device", ns_between(started, on_host)}, StageTime{"decode", ns_between(on_host, decoded)},
-                    StageTime{"pose", ns_between(decoded, posed)}};
+    result.times = {StageTime{"device", ns_between(started, on_host)},
+                    StageTime{"decode", ns_between(on_host, decoded)}, StageTime{"pose", ns_between(decoded, posed)}};
     result.status = result.detections.empty() ? FrameStatus::no_target : FrameStatus::ok;
+    for (std::size_t i = 0; i < levels.size(); ++i) levels[i].note_capacities(&result.capacities[3 * i]);
     for (const CapacityUse& use : result.capacities) {
       if (use.needed > use.capacity) result.status = FrameStatus::overflow;
     }
@@ -120,19 +151,35 @@ struct Detector::Impl {
     return result;
   }
 
-  void decode(const s32* quad, const s32* edge) {
+  void decode(const LevelResult& level) {
     const MarkerGeometry& g = plan.geometry();
     const View2D<const u8> image{frame(), g.width, g.height, g.padded_width};
-    for (int i = 0; i < g.max_contours; ++i, quad += QUAD_WORDS, edge += EDGE_WORDS) {
-      if ((quad[0] & QUAD_VALID) == 0) continue;
+    QuadCandidate candidate;
+    Detection detection;
+    for (int i = 0; i < level.slots(); ++i) {
+      bool has_corners = false;
+      if (!level.quad(i, candidate, has_corners)) continue;
       ++result.quads;
-      QuadCandidate candidate;
-      Detection detection;
-      if (to_candidate(quad, edge, candidate) && decoder.decode(image, candidate, detection)) {
-        result.detections.push_back(detection);
-      }
+      if (!has_corners || is_known(candidate)) continue;
+      if (decoder.decode(image, candidate, detection)) result.detections.push_back(detection);
     }
-    resolve_duplicates(result.detections);
+  }
+
+  /// Whether a detection has these corners already: most markers are found on both levels.
+  bool is_known(const QuadCandidate& candidate) const {
+    constexpr double kSame = 1.0;  // px
+    for (const Detection& known : result.detections) {
+      int same = 0;
+      for (const auto& corner : candidate.fine) {
+        for (const auto& other : known.corners) {
+          const double dx = corner[0] - other[0];
+          const double dy = corner[1] - other[1];
+          if (dx * dx + dy * dy < kSame * kSame) ++same;
+        }
+      }
+      if (same == 4) return true;
+    }
+    return false;
   }
 
   void take_digests() {
@@ -148,9 +195,7 @@ struct Detector::Impl {
   MarkerPlan plan;
   std::unique_ptr<Stream> stream;
   std::vector<u8> staging;  // empty where the host reaches the device's memory
-  std::vector<u32> contours;
-  std::vector<s32> quads;
-  std::vector<s32> edges;
+  std::vector<LevelResult> levels;
   FrameResult result;
   Clock::time_point started;
 };

@@ -1,7 +1,6 @@
 #include "frame/marker_plan.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <string>
 
@@ -22,6 +21,10 @@ constexpr int kMinQuadSide = 4;
 // Extents that keep the cross products of quad_fit in 32 bits.
 constexpr int kMaxContourSide = 16000;
 
+// Levels of the tiles (docs/marker-pipeline.md): black and white at the 1st and 99th percentile, noise at the 25th of
+// the ranges. A tile must have 4 % of the frame's contrast and 2.5 times its noise, 5 grey levels at least.
+constexpr normalize_params kNormalize = {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40};
+
 int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 int clamp(long long value, int low, int high) {
   return static_cast<int>(std::max<long long>(low, std::min<long long>(high, value)));
@@ -34,6 +37,30 @@ int capacity(const char* what, int wanted, long long by_area, int low, int high)
                 std::to_string(high) + ", or 0 for the default");
   }
   return wanted;
+}
+
+/// Gains as flat_field reads them: two u16 q12 a word, padded like the frame.
+std::vector<u32> pack_gains(const std::vector<float>& gains, const MarkerGeometry& g) {
+  const std::size_t width = static_cast<std::size_t>(g.width);
+  const std::size_t stride = static_cast<std::size_t>(g.padded_width);
+  if (gains.size() != width * static_cast<std::size_t>(g.height)) {
+    throw Error("flat field has " + std::to_string(gains.size()) + " gains; the image has " + std::to_string(g.width) +
+                "x" + std::to_string(g.height) + " pixels");
+  }
+  std::vector<u32> packed(g.frame_bytes() / 2);
+  for (int y = 0; y < g.padded_height; ++y) {
+    for (int x = 0; x < g.padded_width; ++x) {
+      const float gain = gains[static_cast<std::size_t>(std::min(y, g.height - 1)) * width +
+                               static_cast<std::size_t>(std::min(x, g.width - 1))];
+      if (!(gain >= 0.0F && gain < 16.0F)) {
+        throw Error("flat field gain " + std::to_string(gain) + " at (" + std::to_string(x) + ", " + std::to_string(y) +
+                    ") is outside 0 to 16");
+      }
+      const std::size_t to = static_cast<std::size_t>(y) * stride + static_cast<std::size_t>(x);
+      packed[to / 2] |= std::min(65535u, static_cast<u32>(gain * 4096.0F + 0.5F)) << (16 * (to % 2));
+    }
+  }
+  return packed;
 }
 
 }  // namespace
@@ -59,38 +86,14 @@ MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capaciti
   totals_at = run_groups * kGroupSize;
 }
 
-MarkerPlan::MarkerPlan(Backend& backend, const MarkerGeometry& geometry, const DetectorConfig& config)
-    : backend_(backend), geometry_(geometry) {
-  bool want_outer = false;
-  bool want_holes = false;
-  for (const std::string& name : config.families) (family(name).reversed_border ? want_holes : want_outer) = true;
-  build(want_outer, want_holes, !config.flat_field.empty());
-  if (!config.flat_field.empty()) {
-    const MarkerGeometry& g = geometry_;
-    if (config.flat_field.size() != static_cast<std::size_t>(g.width) * static_cast<std::size_t>(g.height)) {
-      throw Error("flat field has " + std::to_string(config.flat_field.size()) + " gains; the image has " +
-                  std::to_string(g.width) + "x" + std::to_string(g.height) + " pixels");
-    }
-    std::vector<u32> gains(g.frame_bytes() / 2);
-    for (int y = 0; y < g.padded_height; ++y) {
-      for (int x = 0; x < g.padded_width; ++x) {
-        const std::size_t from = static_cast<std::size_t>(std::min(y, g.height - 1)) * static_cast<std::size_t>(g.width) +
-                                 static_cast<std::size_t>(std::min(x, g.width - 1));
-        const float gain = config.flat_field[from];
-        if (!(gain >= 0.0F && gain < 16.0F)) {
-          throw Error("flat field gain " + std::to_string(gain) + " at (" + std::to_string(x) + ", " +
-                      std::to_string(y) + ") is outside 0 to 16");
-        }
-        const u32 q12 = std::min(65535u, static_cast<u32>(gain * 4096.0F + 0.5F));
-        const std::size_t to = static_cast<std::size_t>(y) * static_cast<std::size_t>(g.padded_width) +
-                               static_cast<std::size_t>(x);
-        gains[to / 2] |= q12 << (16 * (to % 2));
-      }
-    }
-    const std::unique_ptr<Stream> stream = backend_.make_stream();
-    stream->upload(*gains_, gains.data(), gains.size() * 4);
-    stream->finish();
-  }
+MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config) : backend_(backend) {
+  levels_.push_back({MarkerGeometry(width, height, config.capacities), 1, nullptr, nullptr, nullptr});
+  levels_.push_back(
+      {MarkerGeometry((width + 1) / 2, (height + 1) / 2, config.capacities), 2, nullptr, nullptr, nullptr});
+  frame_ = make(geometry().frame_bytes() / 4);
+  Buffer* pixels = config.flat_field.empty() ? frame_ : add_flat_field(config.flat_field);
+  add_level(0, pixels, pixels, config);
+  add_level(1, add_halve(pixels), pixels, config);
   plan_ = backend_.record(steps_);
 }
 
@@ -99,13 +102,39 @@ Buffer* MarkerPlan::make(std::size_t words) {
   return buffers_.back().get();
 }
 
-void MarkerPlan::build(bool want_outer, bool want_holes, bool flat_field) {
-  const MarkerGeometry& g = geometry_;
+Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
+  const MarkerGeometry& g = geometry();
+  const std::vector<u32> packed = pack_gains(gains, g);
+  Buffer* buffer = make(packed.size());
+  const std::unique_ptr<Stream> stream = backend_.make_stream();
+  stream->upload(*buffer, packed.data(), packed.size() * 4);
+  stream->finish();
+  const int words = static_cast<int>(g.frame_bytes() / 4);
+  Buffer* pixels = make(g.frame_bytes() / 4);
+  steps_.push_back(make_step(flat_field_params{words}, {frame_, buffer, pixels}, words));
+  stages_.push_back({"flat_field", 0, pixels, Stage::Length::whole});
+  return pixels;
+}
+
+Buffer* MarkerPlan::add_halve(Buffer* pixels) {
+  const MarkerGeometry& whole = levels_[0].geometry;
+  const MarkerGeometry& half = levels_[1].geometry;
+  Buffer* half_pixels = make(half.frame_bytes() / 4);
+  const halve_params params{whole.padded_width / 4, whole.padded_height, half.padded_width / 4, half.padded_height};
+  steps_.push_back(make_step(params, {pixels, half_pixels}, params.half_row_words * params.half_rows));
+  stages_.push_back({"halve", 1, half_pixels, Stage::Length::whole});
+  return half_pixels;
+}
+
+void MarkerPlan::add_level(std::size_t index, Buffer* level_pixels, Buffer* pixels, const DetectorConfig& config) {
+  MarkerLevel& level = levels_[index];
+  const MarkerGeometry& g = level.geometry;
+  const MarkerGeometry& whole = geometry();
   const std::size_t contours = static_cast<std::size_t>(g.max_contours);
   const int tile_words = g.tile_rows * g.tile_row_words;
   const int base_at = g.word_groups * kGroupSize;
-  frame_ = make(g.frame_bytes() / 4);
-  Buffer* pixels = frame_;
+  const int height = g.height;
+  const int row_words = g.bit_row_words;
   Buffer* minima = make(static_cast<std::size_t>(tile_words));
   Buffer* maxima = make(static_cast<std::size_t>(tile_words));
   Buffer* histograms = make(kHistogramGroups * 768);
@@ -116,36 +145,27 @@ void MarkerPlan::build(bool want_outer, bool want_holes, bool flat_field) {
   Buffer* cracks = make(static_cast<std::size_t>(g.max_run_ends));
   Buffer* nodes = make(static_cast<std::size_t>(g.max_run_ends));
   Buffer* spans = make(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
-  contours_ = make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
   Buffer* points = make(static_cast<std::size_t>(g.max_points));
-  quads_ = make(contours * QUAD_WORDS);
-  edges_ = make(contours * EDGE_WORDS);
+  level.contours = make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
+  level.quads = make(contours * QUAD_WORDS);
+  level.edges = make(contours * EDGE_WORDS);
 
+  // The step that fills the last of its buffers, or the one that `stage` names, ends a stage.
   const auto run = [&](const auto& params, std::initializer_list<Buffer*> buffers, int items) {
     steps_.push_back(make_step(params, buffers, items));
   };
   const auto stage = [&](const char* name, Buffer* buffer, Stage::Length length = Stage::Length::whole) {
-    stages_.push_back({name, buffer, length});
+    stages_.push_back({(index == 0 ? "" : "half_") + std::string(name), index, buffer, length});
   };
-  const auto height = g.height;
-  const auto row_words = g.bit_row_words;
-
-  if (flat_field) {
-    gains_ = make(g.frame_bytes() / 2);
-    pixels = make(g.frame_bytes() / 4);
-    const int words = static_cast<int>(g.frame_bytes() / 4);
-    run(flat_field_params{words}, {frame_, gains_, pixels}, words);
-    stage("flat_field", pixels);
-  }
-  run(tile_extrema_params{g.tile_row_words, g.tile_rows}, {pixels, minima, maxima}, tile_words);
+  run(tile_extrema_params{g.tile_row_words, g.tile_rows}, {level_pixels, minima, maxima}, tile_words);
   stage("tile_minima", minima);
   stage("tile_maxima", maxima);
   run(tile_histogram_params{tile_words, kHistogramStep, kHistogramGroups}, {minima, maxima, histograms},
       kHistogramGroups * kGroupSize);
   stage("tile_histogram", histograms);
-  run(normalize_params{kHistogramGroups, 10, 990, 250, 40, 30, 5, 40}, {histograms, levels}, kGroupSize);
+  run(kNormalize, {histograms, levels}, kGroupSize);
   stage("normalize", levels);
-  run(threshold_params{g.width, height, row_words, g.tile_rows}, {pixels, minima, maxima, levels, raw_bits},
+  run(threshold_params{g.width, height, row_words, g.tile_rows}, {level_pixels, minima, maxima, levels, raw_bits},
       g.tile_rows * row_words);
   stage("threshold", raw_bits);
   run(despeckle_params{height, row_words}, {raw_bits, bits}, g.bit_words);
@@ -167,22 +187,24 @@ void MarkerPlan::build(bool want_outer, bool want_holes, bool flat_field) {
   measure.min_side = kMinContourSide;
   measure.min_area = kMinContourArea;
   measure.max_side = std::min(kMaxContourSide, std::max(g.width, height));
-  measure.want_outer = want_outer ? 1 : 0;
-  measure.want_holes = want_holes ? 1 : 0;
+  for (const std::string& name : config.families) {
+    (family(name).reversed_border ? measure.want_holes : measure.want_outer) = 1;
+  }
   run(measure, {nodes, offsets, spans}, g.run_groups * kGroupSize);
   run(scan_params{g.totals_at, g.run_groups}, {spans}, kGroupSize);
   run(scan_params{g.totals_at + g.run_groups + 1, g.run_groups}, {spans}, kGroupSize);
   stage("contour_measure", spans);
   run(contour_collect_params{height, row_words, base_at, g.totals_at, g.run_groups, g.max_contours, g.max_points},
-      {spans, offsets, contours_}, std::max(g.run_groups * kGroupSize, g.max_contours));
-  stage("contour_collect", contours_);
-  run(contour_trace_params{g.max_contours}, {nodes, contours_, points}, g.max_contours);
+      {spans, offsets, level.contours}, std::max(g.run_groups * kGroupSize, g.max_contours));
+  stage("contour_collect", level.contours);
+  run(contour_trace_params{g.max_contours}, {nodes, level.contours, points}, g.max_contours);
   stage("contour_trace", points, Stage::Length::points);
-  run(quad_fit_params{g.max_contours, kMinQuadSide}, {contours_, points, quads_}, g.max_contours * kGroupSize);
-  stage("quad_fit", quads_, Stage::Length::quads);
-  run(edge_refine_params{g.width, height, g.padded_width / 4, g.max_contours}, {pixels, levels, quads_, edges_},
+  run(quad_fit_params{g.max_contours, kMinQuadSide}, {level.contours, points, level.quads},
       g.max_contours * kGroupSize);
-  stage("edge_refine", edges_, Stage::Length::edges);
+  stage("quad_fit", level.quads, Stage::Length::quads);
+  run(edge_refine_params{level.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},
+      {pixels, levels, level.quads, level.edges}, g.max_contours * kGroupSize);
+  stage("edge_refine", level.edges, Stage::Length::edges);
 }
 
 std::size_t MarkerPlan::device_bytes() const {

@@ -41,7 +41,7 @@ constexpr int kMinStations = 4;
 
 }  // namespace
 
-bool to_candidate(const s32* quad, const s32* edge, QuadCandidate& candidate) {
+bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& candidate) {
   candidate.reversed_border = (quad[0] & QUAD_HOLE) != 0;
   candidate.has_fine = true;
   std::array<Line, 4> coarse{};
@@ -50,8 +50,8 @@ bool to_candidate(const s32* quad, const s32* edge, QuadCandidate& candidate) {
     const s32* side = quad + QUAD_SIDE + k * QUAD_SIDE_WORDS;
     const s32* refined = edge + k * EDGE_SIDE_WORDS;
     const bool upright = side[0] % 2 == 0;
-    const double u_ref = side[0] / 2;
-    coarse[k] = to_line(upright, u_ref, side[1], side[2]);
+    const double u_ref = side[0] / 2 * scale;
+    coarse[k] = to_line(upright, u_ref, static_cast<double>(side[1]) * scale, side[2]);
     fine[k] = to_line(upright, u_ref, refined[0], refined[1]);
     if (refined[2] < kMinStations) candidate.has_fine = false;
   }

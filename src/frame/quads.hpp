@@ -6,7 +6,7 @@
 namespace berth {
 
 /// Corners from a quadrilateral's sides: coarse from its words of `quads`, fine from those of `edges` (kernels/ops.h).
-/// Returns false where two sides are parallel.
-bool to_candidate(const s32* quad, const s32* edge, QuadCandidate& candidate);
+/// `scale`: pixels of the whole image a pixel of the level it was found in. Returns false where two sides are parallel.
+bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& candidate);
 
 }  // namespace berth

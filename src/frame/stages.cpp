@@ -5,8 +5,11 @@
 namespace berth {
 
 StageReader::StageReader(MarkerPlan& plan, Stream& stream) : plan_(plan), stream_(stream) {
-  fetch(plan.contours(), contours_);
-  fetch(plan.quads(), quads_);
+  for (const MarkerLevel& level : plan.levels()) {
+    levels_.emplace_back();
+    fetch(*level.contours, levels_.back().contours);
+    fetch(*level.quads, levels_.back().quads);
+  }
 }
 
 std::size_t StageReader::fetch(Buffer& buffer, std::vector<u32>& words) {
@@ -18,18 +21,20 @@ std::size_t StageReader::fetch(Buffer& buffer, std::vector<u32>& words) {
 
 const std::vector<u32>& StageReader::read(std::size_t index) {
   const Stage& stage = plan_.stages()[index];
-  const std::size_t slots = static_cast<std::size_t>(plan_.geometry().max_contours);
+  const std::vector<u32>& contours = levels_[stage.level].contours;
+  const std::vector<u32>& found_quads = levels_[stage.level].quads;
+  const std::size_t slots = static_cast<std::size_t>(plan_.levels()[stage.level].geometry.max_contours);
   const std::size_t size = fetch(*stage.buffer, words_);
   switch (stage.length) {
     case Stage::Length::whole:
       break;
     case Stage::Length::run_ends:  // in overflow the last rows are missing, which the offsets' stage shows
-      words_.resize(contours_[0] <= size ? contours_[0] : 0);
+      words_.resize(contours[0] <= size ? contours[0] : 0);
       break;
     case Stage::Length::points: {
       std::size_t used = 0;
       for (std::size_t i = 0; i < slots; ++i) {
-        const u32* record = contours_.data() + CONTOUR_HEADER + i * CONTOUR_WORDS;
+        const u32* record = contours.data() + CONTOUR_HEADER + i * CONTOUR_WORDS;
         const std::size_t nodes = record[1] & ~CONTOUR_HOLE;
         if (nodes > 0) used = std::max(used, record[3] + nodes);
       }
@@ -41,7 +46,7 @@ const std::vector<u32>& StageReader::read(std::size_t index) {
       const bool quads = stage.length == Stage::Length::quads;
       const std::size_t width = quads ? QUAD_WORDS : EDGE_WORDS;
       for (std::size_t i = 0; i < slots; ++i) {
-        if (quads_[i * QUAD_WORDS] != 0) continue;
+        if (found_quads[i * QUAD_WORDS] != 0) continue;
         std::fill_n(words_.begin() + static_cast<std::ptrdiff_t>(i * width), width, 0u);
       }
       break;

@@ -21,8 +21,11 @@ class StageReader {
 
   MarkerPlan& plan_;
   Stream& stream_;
-  std::vector<u32> contours_;
-  std::vector<u32> quads_;
+  struct Level {
+    std::vector<u32> contours;
+    std::vector<u32> quads;
+  };
+  std::vector<Level> levels_;
   std::vector<u32> words_;
 };
 

@@ -9,10 +9,15 @@
 namespace berth::reference {
 namespace {
 
-/// A side's coarse line, as quad_fit wrote it.
+/// A side's coarse line, as quad_fit wrote it, in the whole image.
 struct Line {
-  explicit Line(const s32* words)
-      : upright(words[0] % 2 == 0), u_ref(words[0] / 2), v_ref(words[1]), slope(words[2]), from(words[3]), to(words[4]) {}
+  Line(const s32* words, int scale)
+      : upright(words[0] % 2 == 0),
+        u_ref(words[0] / 2 * scale),
+        v_ref(words[1] * scale),
+        slope(words[2]),
+        from(words[3] * scale),
+        to(words[4] * scale) {}
   int length() const { return std::abs(to - from); }
   std::int64_t v_at(int u) const {
     return v_ref + LineFit::floor_shift(static_cast<std::int64_t>(slope) * (u - u_ref), 6);
@@ -23,8 +28,8 @@ struct Line {
 };
 
 struct Station {
-  int u;           // about the side's middle, half pixels
-  int offset_q9;   // of the edge from the coarse line, px
+  int u;          // about the side's middle, half pixels
+  int offset_q9;  // of the edge from the coarse line, px
 };
 
 class Refiner {
@@ -123,7 +128,8 @@ void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* leve
     const s32* quad = quads + slot * QUAD_WORDS;
     if ((quad[0] & QUAD_VALID) == 0) continue;
     for (int k = 0; k < 4; ++k) {
-      refiner.refine(Line(quad + QUAD_SIDE + k * QUAD_SIDE_WORDS), edges + slot * EDGE_WORDS + k * EDGE_SIDE_WORDS);
+      refiner.refine(Line(quad + QUAD_SIDE + k * QUAD_SIDE_WORDS, p.scale),
+                     edges + slot * EDGE_WORDS + k * EDGE_SIDE_WORDS);
     }
   }
 }

@@ -11,7 +11,8 @@ u32 quantile(const normalize_params& p, const u32* histograms, int kind, int per
   for (int i = 0; i < p.groups * 256; ++i) count += histograms[i / 256 * 768 + kind * 256 + i % 256];
   u64 below = 0;
   for (u32 level = 0; level < 256; ++level) {
-    for (int group = 0; group < p.groups; ++group) below += histograms[group * 768 + kind * 256 + static_cast<int>(level)];
+    for (int group = 0; group < p.groups; ++group)
+      below += histograms[group * 768 + kind * 256 + static_cast<int>(level)];
     if (below * 1000 > count * static_cast<u64>(permille)) return level;
   }
   return 255;

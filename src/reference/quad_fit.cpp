@@ -38,7 +38,8 @@ class QuadFit {
     quad[1] = count_;
     quad[2] = static_cast<s32>(area_ * turn_);
     quad[3] = shortest_;
-    for (int k = 0; k < 4; ++k) write_side(k, lines[static_cast<std::size_t>(k)], quad + QUAD_SIDE + k * QUAD_SIDE_WORDS);
+    for (int k = 0; k < 4; ++k)
+      write_side(k, lines[static_cast<std::size_t>(k)], quad + QUAD_SIDE + k * QUAD_SIDE_WORDS);
     return true;
   }
 

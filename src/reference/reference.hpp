@@ -8,6 +8,7 @@
 namespace berth::reference {
 
 void flat_field(const flat_field_params& p, const u32* pixels, const u32* gains, u32* flat);
+void halve(const halve_params& p, const u32* pixels, u32* half_pixels);
 void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, u32* maxima);
 void tile_histogram(const tile_histogram_params& p, const u32* minima, const u32* maxima, u32* histograms);
 void normalize(const normalize_params& p, const u32* histograms, u32* levels);

@@ -15,8 +15,7 @@ namespace {
 class FrameRun {
  public:
   FrameRun(Backend& backend, View2D<const u8> image, const DetectorConfig& config)
-      : plan_(backend, MarkerGeometry(image.width, image.height, config.capacities), config),
-        stream_(backend.make_stream()) {
+      : plan_(backend, image.width, image.height, config), stream_(backend.make_stream()) {
     std::vector<u8> frame(plan_.geometry().frame_bytes());
     pad_frame(image, plan_.geometry(), frame.data());
     stream_->upload(plan_.frame(), frame.data(), frame.size());
@@ -73,8 +72,8 @@ VerifyReport verify_backend(Backend& candidate, Backend& reference, const Verify
   };
   for (const Op op : all_ops()) {
     for (const cases::OpCase& op_case : cases::cases_for(op)) {
-      const std::string difference = cases::first_difference(op_case, cases::run_case(op_case, reference),
-                                                             cases::run_case(op_case, candidate));
+      const std::string difference =
+          cases::first_difference(op_case, cases::run_case(op_case, reference), cases::run_case(op_case, candidate));
       if (!difference.empty()) note(std::string("operation ") + name_of(op) + ", case " + difference);
       ++report.cases;
     }

@@ -13,7 +13,8 @@ std::vector<OpCase> threshold_cases() {
       const int row_words = (width + 31) / 32;
       const int tile_rows = (height + 3) / 4;
       const std::size_t tiles = static_cast<std::size_t>(row_words * 2) * static_cast<std::size_t>(tile_rows);
-      const std::vector<u32> pixels = random_bytes(tiles * 16, {0, 5, 120, 122, 123, 127, 128, 130, 250, 255}, contrast);
+      const std::vector<u32> pixels =
+          random_bytes(tiles * 16, {0, 5, 120, 122, 123, 127, 128, 130, 250, 255}, contrast);
       std::vector<u32> minima(tiles);
       std::vector<u32> maxima(tiles);
       const std::unique_ptr<Backend> reference = open_backend("reference");
@@ -24,7 +25,10 @@ std::vector<OpCase> threshold_cases() {
       maxima.assign(made[2].begin(), made[2].begin() + static_cast<std::ptrdiff_t>(tiles));
       cases.push_back(make_case("width_" + std::to_string(width) + "_contrast_" + std::to_string(contrast),
                                 threshold_params{width, height, row_words, tile_rows},
-                                {pixels, minima, maxima, {0, 0, 0, contrast},
+                                {pixels,
+                                 minima,
+                                 maxima,
+                                 {0, 0, 0, contrast},
                                  std::vector<u32>(static_cast<std::size_t>(height * row_words), 5)},
                                 tile_rows * row_words));
     }

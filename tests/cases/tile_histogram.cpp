@@ -16,10 +16,10 @@ std::vector<OpCase> tile_histogram_cases() {
                               {minima, maxima, std::vector<u32>(static_cast<std::size_t>(p.groups) * 768, 9)},
                               p.groups * kGroupSize));
   }
-  cases.push_back(make_case("one_bin", tile_histogram_params{512, 1, 2},
-                            {std::vector<u32>(512, 0x40404040), std::vector<u32>(512, 0x41414141),
-                             std::vector<u32>(1536, 9)},
-                            2 * kGroupSize));
+  cases.push_back(
+      make_case("one_bin", tile_histogram_params{512, 1, 2},
+                {std::vector<u32>(512, 0x40404040), std::vector<u32>(512, 0x41414141), std::vector<u32>(1536, 9)},
+                2 * kGroupSize));
   return cases;
 }
 

@@ -19,13 +19,14 @@ constexpr u32 kGuard = 0xa5c3f00du;
 std::vector<OpCase> cases_from_frame(const std::string& name, Op op, View2D<const u8> image,
                                      const DetectorConfig& config) {
   const std::unique_ptr<Backend> reference = open_backend("reference");
-  MarkerPlan plan(*reference, MarkerGeometry(image.width, image.height, config.capacities), config);
+  MarkerPlan plan(*reference, image.width, image.height, config);
   pad_frame(image, plan.geometry(), static_cast<u8*>(plan.frame().host()));
   const std::unique_ptr<Stream> stream = reference->make_stream();
   std::vector<OpCase> cases;
   for (const Step& step : plan.steps()) {
     if (step.op == op) {
-      OpCase op_case{name + (cases.empty() ? "" : "_" + std::to_string(cases.size() + 1)), op, step.params, {}, step.items};
+      OpCase op_case{
+          name + (cases.empty() ? "" : "_" + std::to_string(cases.size() + 1)), op, step.params, {}, step.items};
       for (Buffer* buffer : step.buffers) {
         const u32* words = static_cast<const u32*>(buffer->host());
         op_case.buffers.emplace_back(words, words + buffer->bytes() / 4);
@@ -61,8 +62,8 @@ std::vector<u32> random_bytes(std::size_t words, const std::vector<u8>& levels, 
 
 std::vector<OpCase> cases_for(Op op) {
   switch (op) {
-#define X(op)   \
-  case Op::op:  \
+#define X(op)  \
+  case Op::op: \
     return op##_cases();
     BERTH_OPS(X)
 #undef X
@@ -97,8 +98,8 @@ std::string first_difference(const OpCase& op_case, const std::vector<std::vecto
     for (std::size_t i = 0; i < expected[buffer].size(); ++i) {
       if (expected[buffer][i] == found[buffer][i]) continue;
       char text[160];
-      std::snprintf(text, sizeof text, "%s: buffer %zu, word %zu of %zu is 0x%08x, not 0x%08x", op_case.name.c_str(), buffer,
-                    i, op_case.buffers[buffer].size(), found[buffer][i], expected[buffer][i]);
+      std::snprintf(text, sizeof text, "%s: buffer %zu, word %zu of %zu is 0x%08x, not 0x%08x", op_case.name.c_str(),
+                    buffer, i, op_case.buffers[buffer].size(), found[buffer][i], expected[buffer][i]);
       return text;
     }
   }

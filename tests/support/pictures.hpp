@@ -23,7 +23,8 @@ GrayImage uniform(int width, int height, u8 level);
 /// Every pixel one of the levels.
 GrayImage noise(int width, int height, const std::vector<u8>& levels, u64 seed);
 GrayImage checkerboard(int width, int height, int cell);
-/// Dark convex quadrilaterals of random place, size and turn with light ones inside, on a light ground, with ±spread noise.
+/// Dark convex quadrilaterals of random place, size and turn with light ones inside, on a light ground, with ±spread
+/// noise.
 GrayImage quads(int width, int height, int count, int spread, u64 seed);
 /// Nested frames, combs and spirals: contours with notches, holes and long ways.
 GrayImage mazes(int width, int height, u64 seed);
