@@ -23,25 +23,6 @@ struct Found {
   CodeMatch match;
 };
 
-using Match = CodeMatch (CodeMatcher::*)(const Layout&, const Reading&) const;
-
-// The best match of a reading in any family of the group; the family named first wins a draw.
-bool match_group(const Group& group, const Reading& reading, Match how, Found& found) {
-  for (const CodeMatcher& matcher : group.matchers) {
-    const CodeMatch match = (matcher.*how)(group.layout, reading);
-    if (match.entry < 0) continue;
-    if (found.matcher != nullptr && match.hamming >= found.match.hamming) continue;
-    found = {&matcher, match};
-  }
-  return found.matcher != nullptr;
-}
-
-double mean_distance(const Reading& reading, std::size_t n) {
-  double sum = 0;
-  for (std::size_t i = 0; i < n; ++i) sum += reading.value[i] < 0 ? -reading.value[i] : reading.value[i];
-  return sum / static_cast<double>(n);
-}
-
 void fill(const QuadCandidate& quad, const Found& found, double margin, Detection& detection) {
   detection = Detection();
   detection.family = &found.matcher->book().family();
@@ -58,6 +39,70 @@ void fill(const QuadCandidate& quad, const Found& found, double margin, Detectio
 
 // Share of a module over which a cell is averaged when its centre alone was not enough.
 constexpr double kSpread = 0.6;
+
+// Rings further than this from their planes, relative to half the contrast, lie under a shadow or a glare.
+constexpr double kMisfit = 0.3;
+
+// One group's reading of one candidate, the cheapest way first.
+class Attempt {
+ public:
+  Attempt(View2D<const u8> image, const Group& group) : image_(image), group_(group) {}
+
+  bool read(const QuadCandidate& quad) {
+    const bool fine = aim(quad.fine);
+    const Seen first = fine ? look(Shade::planes, 0) : Seen::no_border;
+    if (first == Seen::cells && match(&CodeMatcher::match_bits)) return true;
+    const bool uneven = first == Seen::no_border || reading_.misfit > kMisfit;
+    if (first == Seen::nothing) return false;
+    if (quad.has_fine && aim(quad.coarse) && look(Shade::planes, 0) == Seen::cells && match(&CodeMatcher::match_bits)) {
+      return true;
+    }
+    if (!fine) return false;
+    aim(quad.fine);
+    if (first == Seen::cells && look(Shade::planes, kSpread) == Seen::cells && match(&CodeMatcher::match_levels)) {
+      return true;
+    }
+    return uneven && look(Shade::edges, kSpread) == Seen::cells &&
+           (match(&CodeMatcher::match_bits) || match(&CodeMatcher::match_levels));
+  }
+
+  const Found& found() const { return found_; }
+
+  /// Mean distance of the cells from their threshold, grey levels.
+  double margin() const {
+    const std::size_t n = group_.layout.x.size();
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) sum += std::fabs(reading_.value[i]);
+    return sum / static_cast<double>(n);
+  }
+
+ private:
+  using Match = CodeMatch (CodeMatcher::*)(const Layout&, const Reading&) const;
+
+  bool aim(const Corners& corners) {
+    return map_.set(corners, group_.layout.border_width, group_.layout.reach) &&
+           probe_border(image_, map_, group_.layout);
+  }
+
+  Seen look(Shade shade, double spread) { return read_cells(image_, map_, group_.layout, shade, spread, reading_); }
+
+  // The best match of the reading in any family of the group; the family named first wins a draw.
+  bool match(Match how) {
+    for (const CodeMatcher& matcher : group_.matchers) {
+      const CodeMatch match = (matcher.*how)(group_.layout, reading_);
+      if (match.entry < 0) continue;
+      if (found_.matcher != nullptr && match.hamming >= found_.match.hamming) continue;
+      found_ = {&matcher, match};
+    }
+    return found_.matcher != nullptr;
+  }
+
+  View2D<const u8> image_;
+  const Group& group_;
+  QuadMap map_;
+  Reading reading_;
+  Found found_;
+};
 
 }  // namespace
 
@@ -90,25 +135,10 @@ Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 
 bool Decoder::decode(View2D<const u8> image, const QuadCandidate& quad, Detection& detection) const {
   for (const Group& group : impl_->groups) {
-    const Layout& layout = group.layout;
-    if (layout.reversed_border != quad.reversed_border) continue;
-    Reading reading;
-    Found found;
-    const auto read = [&](const Corners& corners, double spread) {
-      QuadMap map;
-      return map.set(corners, layout.border_width, layout.reach) && probe_border(image, map, layout) &&
-             read_cells(image, map, layout, spread, reading);
-    };
-    const bool readable = read(quad.fine, 0);
-    bool done = readable && match_group(group, reading, &CodeMatcher::match_bits, found);
-    if (!done && quad.has_fine) {
-      done = read(quad.coarse, 0) && match_group(group, reading, &CodeMatcher::match_bits, found);
-    }
-    if (!done && readable) {
-      done = read(quad.fine, kSpread) && match_group(group, reading, &CodeMatcher::match_levels, found);
-    }
-    if (!done) continue;
-    fill(quad, found, mean_distance(reading, layout.x.size()), detection);
+    if (group.layout.reversed_border != quad.reversed_border) continue;
+    Attempt attempt(image, group);
+    if (!attempt.read(quad)) continue;
+    fill(quad, attempt.found(), attempt.margin(), detection);
     return true;
   }
   return false;

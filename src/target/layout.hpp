@@ -36,7 +36,8 @@ struct Layout {
   std::vector<int> neighbours;
   /// The border's dark and light rings, one point a module.
   std::vector<RingPoint> ring;
-  /// Sixteen of them, enough to tell most quadrilaterals from a marker.
+  /// Sixteen places, enough to tell most quadrilaterals from a marker: eight inside, then the eight beside them
+  /// outside.
   std::vector<RingPoint> probe;
 };
 
