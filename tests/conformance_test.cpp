@@ -41,16 +41,18 @@ TEST_P(EveryBackend, WritesTheReferenceBits) {
   const std::unique_ptr<Backend> reference = open_backend("reference");
   const std::unique_ptr<Backend> backend = open_backend(name);
   for (const cases::OpCase& op_case : cases::cases_for(op)) {
-    EXPECT_EQ(cases::first_difference(op_case, cases::run_case(op_case, *reference), cases::run_case(op_case, *backend)),
-              "");
+    EXPECT_EQ(
+        cases::first_difference(op_case, cases::run_case(op_case, *reference), cases::run_case(op_case, *backend)), "");
   }
+}
+
+std::string case_name(const ::testing::TestParamInfo<EveryBackend::ParamType>& tested) {
+  return std::get<0>(tested.param) + "_" + name_of(std::get<1>(tested.param));
 }
 
 INSTANTIATE_TEST_SUITE_P(Ops, EveryBackend,
                          ::testing::Combine(::testing::ValuesIn(backends_under_test()), ::testing::ValuesIn(all_ops())),
-                         [](const ::testing::TestParamInfo<EveryBackend::ParamType>& info) {
-                           return std::get<0>(info.param) + "_" + name_of(std::get<1>(info.param));
-                         });
+                         case_name);
 
 }  // namespace
 }  // namespace berth

@@ -14,8 +14,11 @@ namespace {
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 namespace kernel {
-#include "all.inl"
+// The prelude comes first.
+// clang-format off
 #include "prelude/cpu.h"
+#include "all.inl"
+// clang-format on
 }  // namespace kernel
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic pop
