@@ -5,7 +5,6 @@
 #include <CLI/Version.hpp>
 #include <cstdlib>
 #include <memory>
-#include <opencv2/core/utility.hpp>
 
 #include "berth/backend.hpp"
 #include "commands.hpp"
@@ -71,7 +70,7 @@ Json describe() {
   const KernelCache cache = kernel_cache();
   Json json = {{"berth", BERTH_VERSION},
                {"build", {{"compiler", compiler()}, {"type", BERTH_BUILD_TYPE}}},
-               {"libraries", {{"opencv", cv::getVersionString()}, {"fmt", FMT_VERSION}, {"cli11", CLI11_VERSION}}},
+               {"libraries", {{"opencv", opencv_version()}, {"fmt", FMT_VERSION}, {"cli11", CLI11_VERSION}}},
                {"system", this_system()},
                {"processor",
                 {{"model", processor.model},

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/core/utility.hpp>
 #include <sstream>
 #include <thread>
 
@@ -76,5 +77,7 @@ std::string this_system() {
   if (!system.empty()) system += ", ";
   return system + name.sysname + " " + name.release + ", " + name.machine;
 }
+
+std::string opencv_version() { return cv::getVersionString(); }
 
 }  // namespace berth::cli

@@ -27,4 +27,7 @@ KernelCache kernel_cache();
 /// Name and version of the system, e.g. "Debian GNU/Linux 12 (bookworm), Linux 6.1.0".
 std::string this_system();
 
+/// Of the OpenCV that is loaded, which may be newer than the one this was built with.
+std::string opencv_version();
+
 }  // namespace berth::cli

@@ -42,9 +42,10 @@ class InterruptWatch {
 
 using MarkerKey = std::pair<std::string, int>;
 
-class Stream {
+/// One run_stream: what it was asked for and what it has gathered so far.
+class StreamRun {
  public:
-  Stream(Source& source, const StreamOptions& options, Console& console)
+  StreamRun(Source& source, const StreamOptions& options, Console& console)
       : source_(source),
         options_(options),
         console_(console),
@@ -271,7 +272,7 @@ class Stream {
 }  // namespace
 
 std::uint64_t run_stream(Source& source, const StreamOptions& options, Console& console) {
-  return Stream(source, options, console).run();
+  return StreamRun(source, options, console).run();
 }
 
 }  // namespace berth::cli
