@@ -59,9 +59,20 @@ std::vector<int> sample_ids(const MarkerFamily& family) {
 }
 
 TEST(Families, PatternsAreLibapriltags) {
-  for (auto create : {tag36h11_create, tag36h10_create, tag25h9_create, tag16h5_create, tagStandard41h12_create,
-                      tagStandard52h13_create, tagCircle21h7_create, tagCircle49h12_create, tagCustom48h12_create}) {
-    apriltag_family_t* const theirs = create();
+  struct {
+    apriltag_family_t* (*create)();
+    void (*destroy)(apriltag_family_t*);
+  } const libraries[] = {{tag36h11_create, tag36h11_destroy},
+                         {tag36h10_create, tag36h10_destroy},
+                         {tag25h9_create, tag25h9_destroy},
+                         {tag16h5_create, tag16h5_destroy},
+                         {tagStandard41h12_create, tagStandard41h12_destroy},
+                         {tagStandard52h13_create, tagStandard52h13_destroy},
+                         {tagCircle21h7_create, tagCircle21h7_destroy},
+                         {tagCircle49h12_create, tagCircle49h12_destroy},
+                         {tagCustom48h12_create, tagCustom48h12_destroy}};
+  for (const auto& library : libraries) {
+    apriltag_family_t* const theirs = library.create();
     const MarkerFamily& ours = family(theirs->name);
     ASSERT_EQ(ours.codes.size(), theirs->ncodes);
     EXPECT_EQ(ours.total_width, theirs->total_width);
@@ -77,6 +88,7 @@ TEST(Families, PatternsAreLibapriltags) {
       std::free(image->buf);  // image_u8_destroy is in another of their libraries
       std::free(image);
     }
+    library.destroy(theirs);
   }
 }
 

@@ -33,6 +33,21 @@ struct Family {
   std::vector<std::uint64_t> codes;
 };
 
+struct LibraryFamily {
+  apriltag_family_t* (*create)();
+  void (*destroy)(apriltag_family_t*);
+};
+
+const LibraryFamily kLibraryFamilies[] = {{tag36h11_create, tag36h11_destroy},
+                                          {tag36h10_create, tag36h10_destroy},
+                                          {tag25h9_create, tag25h9_destroy},
+                                          {tag16h5_create, tag16h5_destroy},
+                                          {tagStandard41h12_create, tagStandard41h12_destroy},
+                                          {tagStandard52h13_create, tagStandard52h13_destroy},
+                                          {tagCircle21h7_create, tagCircle21h7_destroy},
+                                          {tagCircle49h12_create, tagCircle49h12_destroy},
+                                          {tagCustom48h12_create, tagCustom48h12_destroy}};
+
 [[noreturn]] void fail(const std::string& why) {
   std::cerr << "generate_families: " << why << "\n";
   std::exit(1);
@@ -80,7 +95,7 @@ int smallest_distance(const Family& family) {
   return smallest;
 }
 
-Family from_apriltag(apriltag_family_t* source) {
+Family from_apriltag(const apriltag_family_t* source) {
   Family family;
   family.name = source->name;
   family.border_width = source->width_at_border;
@@ -161,9 +176,10 @@ void write(std::ostream& out, const std::vector<Family>& families) {
 int main(int argc, char** argv) {
   if (argc != 2) fail("usage: generate_families OUTPUT");
   std::vector<Family> families;
-  for (auto create : {tag36h11_create, tag36h10_create, tag25h9_create, tag16h5_create, tagStandard41h12_create,
-                      tagStandard52h13_create, tagCircle21h7_create, tagCircle49h12_create, tagCustom48h12_create}) {
-    families.push_back(from_apriltag(create()));
+  for (const LibraryFamily& source : kLibraryFamilies) {
+    apriltag_family_t* const made = source.create();
+    families.push_back(from_apriltag(made));
+    source.destroy(made);
   }
   int dictionary = cv::aruco::DICT_4X4_50;
   for (int side = 4; side <= 7; ++side) {
