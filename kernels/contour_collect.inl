@@ -12,7 +12,8 @@ BODY
     ranks[LID] = GROUP < p.groups ? spans[GID] : 0u;
   EACH_END
   EACH_ITEM
-    if (LID == 0 && GROUP < p.groups) {
+    // Most groups begin no contour: nothing to number.
+    if (LID == 0 && GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
       u32 rank = spans[p.totals_at + GROUP];
       u32 start = spans[p.totals_at + p.groups + 1 + GROUP];
       for (int i = 0; i < GROUP_SIZE; ++i) {
