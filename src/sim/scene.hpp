@@ -94,7 +94,7 @@ struct Sensor {
   /// Tone curve: out = 255 · (in / 255)^gamma; 1 is linear.
   double gamma = 1;
   /// Noise of amplifier and converter, grey levels, after the tone curve.
-  double read_noise = 1.5;
+  double read_noise = 1.8;
 };
 
 /// How everything moves in the camera frame during the exposure: X(τ) = rotation(τ·turn)·X + τ·shift, τ = −½ … ½.
