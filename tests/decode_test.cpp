@@ -203,7 +203,7 @@ TEST(Decode, TexturesHoldNoMarkers) {
     for (int picture = 0; picture < 5; ++picture) {
       GrayImage image = texture(256, sigma, random.between(10, 90), random);
       for (int k = 0; k < 10000; ++k) {
-        const Corners corners = random_corners(random, random.between(12, 90), random.between(0, 60),
+        const Corners corners = random_corners(random, random.between(5, 90), random.between(0, 60),
                                                random.between(0, 256), random.between(0, 256));
         QuadCandidate quad = candidate(*families[0], corners, 0);
         quad.reversed_border = (k & 1) != 0;

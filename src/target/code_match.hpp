@@ -34,6 +34,7 @@ class CodeMatcher {
   double bits_likeness_;
   double levels_likeness_;
   double least_evidence_;
+  int correctable_;
   bool levels_allowed_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "target/sample.hpp"
 
@@ -26,6 +27,21 @@ double side_length(const QuadMap& map, double u0, double v0, double u1, double v
   return std::sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0));
 }
 
+// Area of a module at the corner of the border where it is least, px²: of the parallelogram on that corner's sides,
+// which is the area everywhere without perspective.
+double least_module_area(const QuadMap& map, double w) {
+  const double place[4][2] = {{0, 0}, {w, 0}, {w, w}, {0, w}};
+  double x[4], y[4];
+  for (int i = 0; i < 4; ++i) map.at(place[i][0], place[i][1], x[i], y[i]);
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 4; ++i) {
+    const int before = (i + 3) & 3, after = (i + 1) & 3;
+    const double area = (x[after] - x[i]) * (y[before] - y[i]) - (x[before] - x[i]) * (y[after] - y[i]);
+    least = std::min(least, area / (w * w));
+  }
+  return least;
+}
+
 template <class Shading>
 Seen fill(View2D<const u8> image, const QuadMap& map, const Layout& layout, const Shading& shading, double spread,
           Reading& reading) {
@@ -33,6 +49,7 @@ Seen fill(View2D<const u8> image, const QuadMap& map, const Layout& layout, cons
   reading.half_contrast = shading.half_contrast();
   reading.module_u_px = (side_length(map, 0, 0, w, 0) + side_length(map, 0, w, w, w)) / (2 * w);
   reading.module_v_px = (side_length(map, 0, 0, 0, w) + side_length(map, w, 0, w, w)) / (2 * w);
+  reading.module_area_px2 = least_module_area(map, w);
   // One point a pixel is all there is to know of a cell; more than four by four is more than it takes.
   const auto points_for = [&](double module_px) {
     return std::min(4, std::max(1, static_cast<int>(spread * module_px + 0.5)));

@@ -20,6 +20,8 @@ struct Reading {
   double misfit = 0;
   /// Mean side of a module along the columns and the rows, px.
   double module_u_px = 0, module_v_px = 0;
+  /// Area of a module at the border's corner where it is least, px².
+  double module_area_px2 = 0;
 };
 
 /// Where a reading's thresholds come from: PlaneShading or EdgeShading.
