@@ -40,8 +40,9 @@ double visible_share(const Scene& scene, const std::vector<Layer>& layers, std::
   if (!layers[pattern].visible()) return 0;
   int seen = 0;
   for (int i = 0; i < kVisiblePoints * kVisiblePoints; ++i) {
-    const Vec2 on_plane = {((i % kVisiblePoints + 0.5) / kVisiblePoints - 0.5) * side_m,
-                           ((i / kVisiblePoints + 0.5) / kVisiblePoints - 0.5) * side_m};
+    const int column = i % kVisiblePoints, row = i / kVisiblePoints;
+    const Vec2 on_plane = {((column + 0.5) / kVisiblePoints - 0.5) * side_m,
+                           ((row + 0.5) / kVisiblePoints - 0.5) * side_m};
     const Vec3 point = layers[pattern].camera_point(on_plane);
     if (point[2] < kNear_m) continue;
     const Vec2 ray = {point[0] / point[2], point[1] / point[2]};

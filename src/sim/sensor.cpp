@@ -94,7 +94,8 @@ void disc_blur(std::vector<double>& image, int width, int height, double radius_
     for (int dx = -reach; dx <= reach; ++dx) {
       int inside = 0;
       for (int i = 0; i < 64; ++i) {
-        const double x = dx + (i % 8 - 3.5) / 8, y = dy + (i / 8 - 3.5) / 8;
+        const int column = i % 8, row = i / 8;
+        const double x = dx + (column - 3.5) / 8, y = dy + (row - 3.5) / 8;
         if (x * x + y * y <= radius_px * radius_px) ++inside;
       }
       if (inside > 0) taps.push_back({dx, dy, static_cast<double>(inside)});

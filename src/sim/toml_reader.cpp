@@ -109,7 +109,7 @@ std::string TomlReader::text(const std::string& key, const std::string& otherwis
 
 std::string TomlReader::choice(const std::string& key, const std::string& otherwise,
                                const std::vector<std::string>& allowed) {
-  const std::string value = text(key, otherwise);
+  std::string value = text(key, otherwise);
   if (std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return value;
   std::string all;
   for (const std::string& one : allowed) all += (all.empty() ? "\"" : ", \"") + one + "\"";
@@ -170,7 +170,7 @@ void TomlReader::finish() const {
     const std::string name(key.str());
     if (asked_.count(name) != 0) continue;
     std::string known;
-    for (const std::string& one : asked_) known += (known.empty() ? "" : ", ") + one;
+    for (const std::string& one : asked_) known.append(known.empty() ? "" : ", ").append(one);
     throw Error(file_ + ":" + std::to_string(key.source().begin.line) + ": field '" + prefix_ + name +
                 "' is unknown here; remove it or use one of " + known);
   }
