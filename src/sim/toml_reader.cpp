@@ -166,14 +166,15 @@ std::vector<TomlReader> TomlReader::tables(const std::string& key) {
 
 void TomlReader::finish() const {
   if (table_ == nullptr) return;
-  for (const auto& [key, node] : *table_) {
-    const std::string name(key.str());
-    if (asked_.count(name) != 0) continue;
-    std::string known;
-    for (const std::string& one : asked_) known.append(known.empty() ? "" : ", ").append(one);
-    throw Error(file_ + ":" + std::to_string(key.source().begin.line) + ": field '" + prefix_ + name +
-                "' is unknown here; remove it or use one of " + known);
-  }
+  const auto unknown = std::find_if(table_->begin(), table_->end(), [&](const auto& entry) {
+    return asked_.count(std::string(entry.first.str())) == 0;
+  });
+  if (unknown == table_->end()) return;
+  const toml::key& key = unknown->first;
+  std::string message = file_ + ":" + std::to_string(key.source().begin.line) + ": field '" + prefix_;
+  message.append(key.str()).append("' is unknown here; remove it or use one of ");
+  for (const std::string& one : asked_) message.append(one == *asked_.begin() ? "" : ", ").append(one);
+  throw Error(message);
 }
 
 }  // namespace berth::sim
