@@ -2,8 +2,9 @@
 // A station is a pixel row (upright sides) or column that the side crosses: the gradients around the crossing, squared
 // and only those from light outside to dark inside (walking with the dark on the right), place the edge at their
 // centroid. A line through the stations' offsets from the coarse line; then again without those more than 3/8 px off.
-// How far a station looks depends on the side's length, so that the next module stays out of sight.
-// Offsets are q9 px, as v is. Bounds: nine squared gradients times 5 * 512 stay below 2^31.
+// A station looks two pixels to either side, one where the side is shorter than 16 px: the next module, and whatever
+// lies beyond a narrow margin, stay out of sight.
+// Offsets are q9 px, as v is. Bounds: five squared gradients times 3 * 512 stay below 2^31.
 #define EDGE_NOT_SEEN 0x7fffffff
 
 KERNEL(edge_refine)
@@ -37,7 +38,7 @@ BODY
         const int u = 2 * line + 1;
         const int v = v_ref + ((slope * (u - u_ref)) >> 6);
         const int middle = (v + 256) >> 9;
-        const int reach = length < 32 ? 1 : length < 56 ? 2 : length < 96 ? 3 : 4;
+        const int reach = length < 32 ? 1 : 2;
         const int across = upright ? p.width : p.height;
         // Upright: going down the dark lies at smaller x. Level: going left it lies at smaller y.
         const int sign = upright == (u_to > u_from) ? 1 : -1;

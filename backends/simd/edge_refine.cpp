@@ -50,7 +50,7 @@ HWY_ATTR void look(const edge_refine_params& p, const u8* pixels, s32 contrast, 
   const s32 trim = side_trim(length);
   const s32 first = (low + trim) >> 1;
   const s32 lines = ((low + length - trim - 1) >> 1) - first + 1;
-  const int reach = length < 32 ? 1 : length < 56 ? 2 : length < 96 ? 3 : 4;
+  const int reach = length < 32 ? 1 : 2;
   const s32 across = upright ? p.width : p.height;
   const s32 most_lines = upright ? p.height : p.width;
   const s32 sign = upright == (side.to > side.from) ? 1 : -1;

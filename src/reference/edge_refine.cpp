@@ -95,7 +95,7 @@ class Refiner {
 
   bool find_edge(const Line& line, int along, Station& station) const {
     const int length = line.length();
-    const int reach = length < 32 ? 1 : length < 56 ? 2 : length < 96 ? 3 : 4;
+    const int reach = length < 32 ? 1 : 2;
     const std::int64_t v = line.v_at(2 * along + 1);
     const int middle = static_cast<int>(LineFit::floor_shift(v + 256, 9));
     if (along >= (line.upright ? p_.height : p_.width)) return false;
