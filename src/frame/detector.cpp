@@ -103,6 +103,10 @@ struct Detector::Impl {
       slots += static_cast<std::size_t>(level.geometry.max_contours);
     }
     result.detections.reserve(slots);
+    if (!staging.empty()) {  // drivers may finish compiling at the first launch: not in the first frame's time
+      stream->replay(plan.plan());
+      stream->finish();
+    }
   }
 
   u8* frame() { return staging.empty() ? static_cast<u8*>(plan.frame().host()) : staging.data(); }
