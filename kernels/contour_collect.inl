@@ -3,7 +3,7 @@
 KERNEL(contour_collect)
 IN(0, u32, spans)
 IN(1, u32, offsets)
-OUT(2, u32, contours)    // [CONTOUR_HEADER + max_contours * CONTOUR_WORDS]: see ops.h
+OUT(2, u32, contours)  // [CONTOUR_HEADER + max_contours * CONTOUR_WORDS]: see ops.h
 PARAMS(contour_collect)
 SHARED(u32, ranks, 128)
 SHARED(u32, starts, 128)

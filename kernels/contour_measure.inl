@@ -6,10 +6,10 @@
 //   nodes <= 2.5 height + 4, horizontal length <= 2.5 width + 4; a walk longer than any that could pass is stopped.
 // The area's sign tells outlines from holes.
 KERNEL(contour_measure)
-IN(0, u32, nodes)      // [capacity]
+IN(0, u32, nodes)  // [capacity]
 IN(1, u32, offsets)
-OUT(2, u32, spans)     // [totals_at]: nodes of the contour that the run begins, CONTOUR_HOLE set for holes, 0 for none;
-                       // then contours and points of each group: [groups], one unused, [groups]
+OUT(2, u32, spans)  // [totals_at]: nodes of the contour that the run begins, CONTOUR_HOLE set for holes, 0 for none;
+                    // then contours and points of each group: [groups], one unused, [groups]
 PARAMS(contour_measure)
 SHARED(u32, contours, 1)
 SHARED(u32, points, 1)

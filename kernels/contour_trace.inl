@@ -4,7 +4,7 @@
 KERNEL(contour_trace)
 IN(0, u32, nodes)
 IN(1, u32, contours)
-OUT(2, u32, points)    // [max_points]: x | y << 16
+OUT(2, u32, points)  // [max_points]: x | y << 16
 PARAMS(contour_trace)
 BODY
   EACH_ITEM

@@ -1,8 +1,8 @@
 // Drops black pixels that have no black neighbour left, right, above or below: noise makes many, and every one would
 // cost a contour. No marker's outline contains one.
 KERNEL(despeckle)
-IN(0, u32, bits)     // [height, row_words]
-OUT(1, u32, clean)   // [height, row_words]
+IN(0, u32, bits)    // [height, row_words]
+OUT(1, u32, clean)  // [height, row_words]
 PARAMS(despeckle)
 BODY
   EACH_ITEM

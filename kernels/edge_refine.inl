@@ -8,13 +8,13 @@
 #define EDGE_NOT_SEEN 0x7fffffff
 
 KERNEL(edge_refine)
-IN(0, u32, pixels)    // [padded_height, row_words]
+IN(0, u32, pixels)  // [padded_height, row_words]
 IN(1, u32, levels)
 IN(2, s32, quads)
-OUT(3, s32, edges)    // [max_contours, EDGE_WORDS]: see ops.h; nothing is written where there is no quadrilateral
+OUT(3, s32, edges)  // [max_contours, EDGE_WORDS]: see ops.h; nothing is written where there is no quadrilateral
 PARAMS(edge_refine)
 SHARED(int, offset, 128)
-SHARED(int, along, 128)   // u of the station about the side's middle
+SHARED(int, along, 128)  // u of the station about the side's middle
 BODY
   if (GROUP < p.max_contours && (quads[GROUP * QUAD_WORDS] & QUAD_VALID) != 0) {
     EACH_ITEM

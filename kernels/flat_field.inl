@@ -4,9 +4,9 @@ FN u32 flat_field_pixel(u32 word, int shift, u32 gain) {
   return min((((word >> shift) & 255u) * gain + 2048u) >> 12, 255u) << shift;
 }
 KERNEL(flat_field)
-IN(0, u32, pixels)   // [words]
-IN(1, u32, gains)    // [words, 2]: two gains a word, u16 q12, leftmost in the low half
-OUT(2, u32, flat)    // [words]
+IN(0, u32, pixels)  // [words]
+IN(1, u32, gains)   // [words, 2]: two gains a word, u16 q12, leftmost in the low half
+OUT(2, u32, flat)   // [words]
 PARAMS(flat_field)
 BODY
   EACH_ITEM

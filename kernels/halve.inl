@@ -8,7 +8,7 @@ FN u32 halve_pairs(u32 upper, u32 lower) {
   return (means | (means >> 8)) & 0xffffu;
 }
 KERNEL(halve)
-IN(0, u32, pixels)   // [rows, row_words]
+IN(0, u32, pixels)        // [rows, row_words]
 OUT(1, u32, half_pixels)  // [half_rows, half_row_words]
 PARAMS(halve)
 BODY

@@ -3,8 +3,8 @@
 // a share of white - black in the pixels as they are; so no pixel is rewritten (docs/marker-pipeline.md).
 // A quantile is the first level whose cumulative count exceeds count * permille / 1000. Bounds: count < 2^21.
 KERNEL(normalize)
-IN(0, u32, histograms)    // [groups, 3, 256]
-OUT(1, u32, levels)       // [4]: black, white, noise, contrast
+IN(0, u32, histograms)  // [groups, 3, 256]
+OUT(1, u32, levels)     // [4]: black, white, noise, contrast
 PARAMS(normalize)
 SHARED(u32, counts, 768)
 SHARED(u32, quantiles, 3)

@@ -55,20 +55,20 @@ struct tile_histogram_params {
 };
 
 struct normalize_params {
-  int groups;             /* partial histograms to add up */
-  int black_permille;     /* the black level is this quantile of the tiles' minima … */
-  int white_permille;     /* … the white level this one of their maxima … */
-  int noise_permille;     /* … and the noise this one of their ranges */
-  int contrast_permille;  /* asked contrast as a share of white - black */
-  int noise_gain_q4;      /* asked contrast as a multiple of the noise, q4 */
-  int min_contrast;       /* bounds of the contrast, grey levels */
+  int groups;            /* partial histograms to add up */
+  int black_permille;    /* the black level is this quantile of the tiles' minima … */
+  int white_permille;    /* … the white level this one of their maxima … */
+  int noise_permille;    /* … and the noise this one of their ranges */
+  int contrast_permille; /* asked contrast as a share of white - black */
+  int noise_gain_q4;     /* asked contrast as a multiple of the noise, q4 */
+  int min_contrast;      /* bounds of the contrast, grey levels */
   int max_contrast;
 };
 
 struct threshold_params {
   int width; /* of the image, px */
   int height;
-  int row_words;      /* words of bits in a row: padded_width / 32 */
+  int row_words; /* words of bits in a row: padded_width / 32 */
   int tile_rows;
 };
 
@@ -106,14 +106,14 @@ struct contour_measure_params {
   int height;
   int row_words;
   int base_at;
-  int capacity;    /* of run ends */
-  int totals_at;   /* where in spans the group totals begin: a multiple of 128, capacity / 2 or above */
-  int groups;      /* groups of 128 runs */
-  int min_side;    /* least width and height of a contour, px */
-  int min_area;    /* least area, px^2 */
-  int max_side;    /* greatest width and height, px: 16000 at most */
-  int want_outer;  /* keep dark regions' outlines */
-  int want_holes;  /* keep dark regions' holes (families with a reversed border) */
+  int capacity;   /* of run ends */
+  int totals_at;  /* where in spans the group totals begin: a multiple of 128, capacity / 2 or above */
+  int groups;     /* groups of 128 runs */
+  int min_side;   /* least width and height of a contour, px */
+  int min_area;   /* least area, px^2 */
+  int max_side;   /* greatest width and height, px: 16000 at most */
+  int want_outer; /* keep dark regions' outlines */
+  int want_holes; /* keep dark regions' holes (families with a reversed border) */
 };
 
 struct contour_collect_params {
@@ -121,7 +121,7 @@ struct contour_collect_params {
   int row_words;
   int base_at;
   int totals_at;
-  int groups;       /* groups of 128 runs */
+  int groups; /* groups of 128 runs */
   int max_contours;
   int max_points;
 };

@@ -1,8 +1,8 @@
 // How many run ends come before each word of bits, within its group of 128 words, and how many each group has.
 // A run that reaches the right border ends there, in the row's last word: at most 33 run ends a word.
 KERNEL(run_count)
-IN(0, u32, bits)        // [height, row_words]
-OUT(1, u32, offsets)    // [base_at + groups]; words past the last of bits count nothing
+IN(0, u32, bits)      // [height, row_words]
+OUT(1, u32, offsets)  // [base_at + groups]; words past the last of bits count nothing
 PARAMS(run_count)
 SHARED(u32, sums, 128)
 BODY

@@ -1,8 +1,8 @@
 // Writes every run end's crack at its id. Rows that would pass the capacity are dropped whole, with all below them.
 KERNEL(run_emit)
-IN(0, u32, bits)       // [height, row_words]
+IN(0, u32, bits)  // [height, row_words]
 IN(1, u32, offsets)
-OUT(2, u32, cracks)    // [capacity]
+OUT(2, u32, cracks)  // [capacity]
 PARAMS(run_emit)
 BODY
   EACH_ITEM

@@ -6,10 +6,10 @@
 // Every node is written once, by the item that owns its word: no order of arrival, no atomics.
 // Source: the run-length contours of Chang, Chen & Lu 2004, turned from tracing into local successors.
 KERNEL(run_link)
-IN(0, u32, bits)       // [height, row_words]
+IN(0, u32, bits)  // [height, row_words]
 IN(1, u32, offsets)
-IN(2, u32, cracks)     // [capacity]
-OUT(3, u32, nodes)     // [capacity]
+IN(2, u32, cracks)  // [capacity]
+OUT(3, u32, nodes)  // [capacity]
 PARAMS(run_link)
 BODY
   EACH_ITEM
@@ -19,7 +19,8 @@ BODY
       const u32 row_end = RUN_ENDS_BEFORE((y + 1) * p.row_words);
       if (row_end <= U32(p.capacity)) {
         const u32 row_begin = RUN_ENDS_BEFORE(y * p.row_words);
-        const bool has_below = y + 1 < p.height && RUN_ENDS_BEFORE(min(y + 2, p.height) * p.row_words) <= U32(p.capacity);
+        const bool has_below =
+            y + 1 < p.height && RUN_ENDS_BEFORE(min(y + 2, p.height) * p.row_words) <= U32(p.capacity);
         const u32 word_begin = RUN_ENDS_BEFORE(GID);
         const u32 word_end =
             word_begin + POPCOUNT(RUN_EDGES(y, word_x)) + (word_x == p.row_words - 1 ? bits[GID] >> 31 : 0u);
@@ -40,8 +41,8 @@ BODY
           } else if (has_below) {
             const int last = S32(x) - 1;  // the run's last pixel
             const int at = last >> 5;
-            const u32 after = RUN_ENDS_BEFORE((y + 1) * p.row_words + at) +
-                              POPCOUNT(RUN_EDGES(y + 1, at) & bits_through(last & 31));
+            const u32 after =
+                RUN_ENDS_BEFORE((y + 1) * p.row_words + at) + POPCOUNT(RUN_EDGES(y + 1, at) & bits_through(last & 31));
             if ((after & 1u) != 0u) {
               next = id + 1u < row_end && cracks[id + 1u] < cracks[after] ? id + 1u : after;
             } else if (after > row_end && cracks[after - 1u] > cracks[id - 1u]) {

@@ -5,8 +5,7 @@
 
 // Where bits change: bit i is set when pixel i differs from the one before it.
 FN u32 run_edges(u32 here, u32 before) { return here ^ ((here << 1) | (before >> 31)); }
-#define RUN_EDGES(row, x) \
-  run_edges(bits[(row) * p.row_words + (x)], (x) > 0 ? bits[(row) * p.row_words + (x) - 1] : 0u)
+#define RUN_EDGES(row, x) run_edges(bits[(row)*p.row_words + (x)], (x) > 0 ? bits[(row)*p.row_words + (x)-1] : 0u)
 
 // Bits 0 … i of a word.
 FN u32 bits_through(int i) { return (2u << i) - 1u; }

@@ -1,6 +1,6 @@
 // Exclusive prefix sums in place, by one work-group; the total follows the last.
 KERNEL(scan)
-INOUT(0, u32, values)    // [first + count + 1]
+INOUT(0, u32, values)  // [first + count + 1]
 PARAMS(scan)
 SHARED(u32, sums, 128)
 BODY

@@ -3,11 +3,11 @@
 // care") and, like white, not set. An item makes 32 × 4 pixels: a word of each of four rows.
 // Source: the tile threshold of AprilTag 3 (Wang & Olson 2016); SWAR per Warren, Hacker's Delight.
 KERNEL(threshold)
-IN(0, u32, pixels)    // [tile_rows * 4, row_words * 8]
-IN(1, u32, minima)    // [tile_rows, row_words * 2]
+IN(0, u32, pixels)  // [tile_rows * 4, row_words * 8]
+IN(1, u32, minima)  // [tile_rows, row_words * 2]
 IN(2, u32, maxima)
-IN(3, u32, levels)    // [4]
-OUT(4, u32, bits)     // [height, row_words]
+IN(3, u32, levels)  // [4]
+OUT(4, u32, bits)   // [height, row_words]
 PARAMS(threshold)
 BODY
   EACH_ITEM
@@ -45,7 +45,7 @@ BODY
         low = bytes_min(low, bytes_min((low << 8) | low_left, (low >> 8) | low_right));
         high = bytes_max(high, bytes_max((high << 8) | high_left, (high >> 8) | high_right));
         const u32 middle = (low & high) + (((low ^ high) & 0xfefefefeu) >> 1);  // per byte floor((low + high) / 2)
-        const u32 judged = bytes_ge(high - low, contrast) * 255u;              // high >= low: no borrow
+        const u32 judged = bytes_ge(high - low, contrast) * 255u;               // high >= low: no borrow
         const int first = tile_y * 4 * p.row_words * 8 + x * 4;
         for (int k = 0; k < 4; ++k) {
           if (((judged >> (8 * k)) & 1u) != 0u) {

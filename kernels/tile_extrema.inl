@@ -8,9 +8,9 @@ FN u32 highest_byte(u32 word) {
   return bytes_max(pair, pair >> 8) & 255u;
 }
 KERNEL(tile_extrema)
-IN(0, u32, pixels)     // [tile_rows * 4, row_words * 4]
-OUT(1, u32, minima)    // [tile_rows, row_words]
-OUT(2, u32, maxima)    // [tile_rows, row_words]
+IN(0, u32, pixels)   // [tile_rows * 4, row_words * 4]
+OUT(1, u32, minima)  // [tile_rows, row_words]
+OUT(2, u32, maxima)  // [tile_rows, row_words]
 PARAMS(tile_extrema)
 BODY
   EACH_ITEM

@@ -1,9 +1,9 @@
 // How many tiles have which minimum, maximum and range: one partial histogram a group, of every step-th tile word.
 // Counts are sums, so the order of the shared atomics cannot be seen.
 KERNEL(tile_histogram)
-IN(0, u32, minima)         // [words]
-IN(1, u32, maxima)         // [words]
-OUT(2, u32, histograms)    // [groups, 3, 256]: minima, maxima, ranges
+IN(0, u32, minima)       // [words]
+IN(1, u32, maxima)       // [words]
+OUT(2, u32, histograms)  // [groups, 3, 256]: minima, maxima, ranges
 PARAMS(tile_histogram)
 SHARED(u32, counts, 768)
 BODY

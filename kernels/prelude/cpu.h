@@ -4,9 +4,9 @@
 
 #define FN static inline
 #define KERNEL(name) static void name([[maybe_unused]] const int group_,
-#define IN(i, T, x) const T* x,
-#define OUT(i, T, x) T* x,
-#define INOUT(i, T, x) T* x,
+#define IN(i, T, x) const T *x,
+#define OUT(i, T, x) T *x,
+#define INOUT(i, T, x) T *x,
 #define PARAMS(name) const name##_params& p) {
 #define SHARED(T, x, k) T x[k];
 #define BODY

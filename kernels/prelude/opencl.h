@@ -6,15 +6,17 @@ typedef int s32;
 #define FN static inline
 // Prefixed, because the language has functions of its own that are called like operations (normalize).
 #define KERNEL(name) __kernel __attribute__((reqd_work_group_size(GROUP_SIZE, 1, 1))) void berth_##name(
-#define IN(i, T, x) __global const T* restrict x,
-#define OUT(i, T, x) __global T* restrict x,
-#define INOUT(i, T, x) __global T* restrict x,
+#define IN(i, T, x) __global const T *restrict x,
+#define OUT(i, T, x) __global T *restrict x,
+#define INOUT(i, T, x) __global T *restrict x,
 #define PARAMS(name) const struct name##_params p) {
 #define SHARED(T, x, k) __local T x[k];
 #define BODY
 #define END }
 #define EACH_ITEM {
-#define EACH_END } barrier(CLK_LOCAL_MEM_FENCE);
+#define EACH_END \
+  }              \
+  barrier(CLK_LOCAL_MEM_FENCE);
 #define LID ((int)get_local_id(0))
 #define GROUP ((int)get_group_id(0))
 #define GID ((int)get_global_id(0))
