@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "berth/error.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
@@ -37,6 +39,27 @@ TEST(Detector, FindsASimulatedMarkerAndItsPose) {
   ASSERT_TRUE(found.has_pose);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(found.pose.t[i], truth[0].pose.t[i], 0.02 * truth[0].pose.t[2]) << "axis " << i;
+  }
+}
+
+TEST(Detector, AMarkerCutByTheBorderIsNotReported) {
+  const sim::Scene scene = easy_scene();
+  const GrayImage image = sim::render(scene);
+  const TruthMarker marker = sim::truth(scene).at(0);
+  double right = 0;  // the middle of the rightmost side
+  for (std::size_t k = 0; k < 4; ++k)
+    right = std::max(right, (marker.corners[k][0] + marker.corners[(k + 1) % 4][0]) / 2);
+  const std::unique_ptr<Backend> backend = simd();
+  for (int shown = -6; shown <= 24; shown += 2) {  // columns right of it
+    const int width = static_cast<int>(right) + 1 + shown;
+    Detector detector(*backend, width, 480, {});
+    const std::size_t found = detector.detect({image.view().data, width, 480, 640}).detections.size();
+    if (shown < -3) {  // nearer, part of an oblique side is still seen
+      EXPECT_EQ(found, 0u) << shown;
+    }
+    if (shown > 20) {
+      EXPECT_EQ(found, 1u) << shown;
+    }
   }
 }
 

@@ -164,7 +164,7 @@ struct Detector::Impl {
       bool has_corners = false;
       if (!level.quad(i, candidate, has_corners)) continue;
       ++result.quads;
-      if (!has_corners || is_known(candidate)) continue;
+      if (!has_corners || is_cut_off(candidate, g.width, g.height) || is_known(candidate)) continue;
       if (decoder.decode(image, candidate, detection)) result.detections.push_back(detection);
     }
   }

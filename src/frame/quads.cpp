@@ -67,4 +67,16 @@ bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& ca
   return true;
 }
 
+bool is_cut_off(const QuadCandidate& candidate, int width, int height) {
+  constexpr double kMargin = 2;  // px
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto& a = candidate.coarse[k];
+    const auto& b = candidate.coarse[(k + 1) % 4];
+    const double x = (a[0] + b[0]) / 2;
+    const double y = (a[1] + b[1]) / 2;
+    if (x < kMargin || y < kMargin || x > width - 1 - kMargin || y > height - 1 - kMargin) return true;
+  }
+  return false;
+}
+
 }  // namespace berth

@@ -9,4 +9,8 @@ namespace berth {
 /// `scale`: pixels of the whole image a pixel of the level it was found in. Returns false where two sides are parallel.
 bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& candidate);
 
+/// Whether the image's border cuts the quadrilateral off: the middle of a side lies within two pixels of it. Such a
+/// side is the image's, not the marker's, and a pose from it would be silently wrong. A single corner may lie outside.
+bool is_cut_off(const QuadCandidate& candidate, int width, int height);
+
 }  // namespace berth
