@@ -72,7 +72,7 @@ class MarkerPlan {
   Buffer* add_flat_field(const std::vector<float>& gains);
   Buffer* add_halve(Buffer* pixels);
   /// From the level's pixels to its quads, and on the whole image's pixels to its edges.
-  void add_level(std::size_t level, Buffer* level_pixels, Buffer* pixels, const DetectorConfig& config);
+  void add_level(std::size_t index, Buffer* level_pixels, Buffer* pixels, const DetectorConfig& config);
 
   Backend& backend_;
   std::vector<MarkerLevel> levels_;

@@ -50,7 +50,7 @@ bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& ca
     const s32* side = quad + QUAD_SIDE + k * QUAD_SIDE_WORDS;
     const s32* refined = edge + k * EDGE_SIDE_WORDS;
     const bool upright = side[0] % 2 == 0;
-    const double u_ref = side[0] / 2 * scale;
+    const double u_ref = (side[0] >> 1) * scale;
     coarse[k] = to_line(upright, u_ref, static_cast<double>(side[1]) * scale, side[2]);
     fine[k] = to_line(upright, u_ref, refined[0], refined[1]);
     if (refined[2] < kMinStations) candidate.has_fine = false;
