@@ -22,8 +22,10 @@ constexpr int kMinQuadSide = 4;
 constexpr int kMaxContourSide = 16000;
 
 // Levels of the tiles (docs/marker-pipeline.md): black and white at the 1st and 99th percentile, noise at the 25th of
-// the ranges. A tile must have 4 % of the frame's contrast and 2.5 times its noise, 5 grey levels at least.
-constexpr normalize_params kNormalize = {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40};
+// the ranges. A tile must have 4 % of the frame's contrast and 2.5 times its noise; 18 grey levels at least in the
+// whole image, 5 in the halved one, which sees the rest with half the noise.
+constexpr normalize_params kNormalize[] = {{kHistogramGroups, 10, 990, 250, 40, 40, 18, 40},
+                                           {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40}};
 
 int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 int clamp(long long value, int low, int high) {
@@ -163,7 +165,7 @@ void MarkerPlan::add_level(std::size_t index, Buffer* level_pixels, Buffer* pixe
   run(tile_histogram_params{tile_words, kHistogramStep, kHistogramGroups}, {minima, maxima, histograms},
       kHistogramGroups * kGroupSize);
   stage("tile_histogram", histograms);
-  run(kNormalize, {histograms, levels}, kGroupSize);
+  run(kNormalize[index], {histograms, levels}, kGroupSize);
   stage("normalize", levels);
   run(threshold_params{g.width, height, row_words, g.tile_rows}, {level_pixels, minima, maxima, levels, raw_bits},
       g.tile_rows * row_words);
