@@ -17,7 +17,6 @@ using test::run_berth;
 using test::ScratchFolder;
 using testing::AllOf;
 using testing::HasSubstr;
-using testing::Not;
 using testing::StartsWith;
 
 const std::string kGood = std::string(BERTH_TEST_DATA) + "/tag36h11_7.png";

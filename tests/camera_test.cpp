@@ -17,7 +17,7 @@ namespace {
 std::string temporary(const std::string& name) { return testing::TempDir() + "berth_camera_" + name; }
 
 std::string write_text(const std::string& name, const std::string& text) {
-  const std::string path = temporary(name);
+  std::string path = temporary(name);
   std::ofstream(path, std::ios::binary) << text;
   return path;
 }

@@ -18,7 +18,7 @@ namespace {
 const std::string kScenarios = std::string(BERTH_SOURCE_DIR) + "/scenarios/";
 
 std::string written(const std::string& text) {
-  const std::string path =
+  std::string path =
       testing::TempDir() + "berth_scenario_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
   std::ofstream(path) << text;
   return path;

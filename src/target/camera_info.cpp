@@ -23,7 +23,7 @@ constexpr double kMaxCoefficient = 1e3;
 // Reads fields of one file and says which one is wrong and what to do about it.
 class InfoFile {
  public:
-  InfoFile(std::string path, YAML::Node root) : path_(std::move(path)), root_(std::move(root)) {}
+  InfoFile(std::string path, const YAML::Node& root) : path_(std::move(path)), root_(root) {}
 
   [[noreturn]] void fail(const std::string& field, const std::string& problem, const std::string& remedy) const {
     throw Error(path_ + ": " + field + ": " + problem + "; " + remedy);

@@ -23,8 +23,8 @@ struct Layout {
   explicit Layout(const MarkerFamily& family);
   /// Whether the family's data cells are these, in any order.
   bool fits(const MarkerFamily& family) const;
-  /// The cell at column x, row y; -1 where there is none.
-  int cell_at(int x, int y) const;
+  /// The cell at a place; -1 where there is none.
+  int cell_at(int column, int row) const;
 
   int border_width = 0;
   bool reversed_border = false;

@@ -13,7 +13,7 @@ struct QuadMap {
 
   /// Returns false unless the corners are convex, run clockwise on the screen and the map stays finite up to `reach`
   /// units outside the square.
-  bool set(const Corners& corners, double side, double reach);
+  bool set(const Corners& q, double side, double reach);
 
   /// Image point of the square's point (u, v).
   void at(double u, double v, double& x, double& y) const {

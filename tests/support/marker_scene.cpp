@@ -51,7 +51,7 @@ GrayImage draw_marker(const MarkerFamily& family, const std::vector<u8>& pattern
                              m.cy * m.gz - m.ay,        m.ax - m.cx * m.gz,        m.cx * m.ay - m.ax * m.cy,
                              m.ay * m.hz - m.by * m.gz, m.bx * m.gz - m.ax * m.hz, m.ax * m.by - m.bx * m.ay};
   const int total = family.total_width;
-  const double margin = (total - family.border_width) / 2;
+  const int margin = (total - family.border_width) / 2;
   constexpr int kSamples = 4;
   std::vector<double> levels;
   for (int y = 0; y < height; ++y) {
@@ -59,7 +59,8 @@ GrayImage draw_marker(const MarkerFamily& family, const std::vector<u8>& pattern
       double sum = 0;
       for (int k = 0; k < kSamples * kSamples; ++k) {
         const double px = x + (k % kSamples + 0.5) / kSamples - 0.5;
-        const double py = y + (k / kSamples + 0.5) / kSamples - 0.5;
+        const int row = k / kSamples;
+        const double py = y + (row + 0.5) / kSamples - 0.5;
         const double z = inverse[6] * px + inverse[7] * py + inverse[8];
         const double u = (inverse[0] * px + inverse[1] * py + inverse[2]) / z + margin;
         const double v = (inverse[3] * px + inverse[4] * py + inverse[5]) / z + margin;
