@@ -1,6 +1,7 @@
 #include "berth/camera.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -14,7 +15,10 @@
 namespace berth {
 namespace {
 
-std::string temporary(const std::string& name) { return testing::TempDir() + "berth_camera_" + name; }
+// ctest runs tests side by side, each in a process of its own.
+std::string temporary(const std::string& name) {
+  return testing::TempDir() + "berth_camera_" + std::to_string(getpid()) + "_" + name;
+}
 
 std::string write_text(const std::string& name, const std::string& text) {
   std::string path = temporary(name);
