@@ -12,17 +12,10 @@
 #include "berth/error.hpp"
 #include "sim/clutter.hpp"
 #include "sim/render.hpp"
+#include "support/image_digest.hpp"
 
 namespace berth::sim {
 namespace {
-
-u64 digest(const GrayImage& image) {
-  u64 hash = 0xcbf29ce484222325u;  // FNV-1a
-  for (int y = 0; y < image.height(); ++y) {
-    for (int x = 0; x < image.width(); ++x) hash = (hash ^ image.view().at(x, y)) * 0x100000001b3u;
-  }
-  return hash;
-}
 
 struct CorpusGolden {
   const char* name;
@@ -33,8 +26,10 @@ class EveryCorpus : public testing::TestWithParam<CorpusGolden> {};
 
 TEST_P(EveryCorpus, HasTheGoldenBits) {
   const CorpusGolden golden = GetParam();
-  EXPECT_EQ(digest(render(corpus_scene(golden.name, 0, 320, 240))), golden.first) << std::hex << golden.name;
-  EXPECT_EQ(digest(render(corpus_scene(golden.name, 3, 320, 240))), golden.fourth) << std::hex << golden.name;
+  EXPECT_EQ(test::image_digest(render(corpus_scene(golden.name, 0, 320, 240))), golden.first)
+      << std::hex << golden.name;
+  EXPECT_EQ(test::image_digest(render(corpus_scene(golden.name, 3, 320, 240))), golden.fourth)
+      << std::hex << golden.name;
 }
 
 INSTANTIATE_TEST_SUITE_P(Sim, EveryCorpus,

@@ -22,17 +22,10 @@
 #include "sim/exact_math.hpp"
 #include "sim/printed_marker.hpp"
 #include "sim/render.hpp"
+#include "support/image_digest.hpp"
 
 namespace berth::sim {
 namespace {
-
-u64 digest(const GrayImage& image) {
-  u64 hash = 0xcbf29ce484222325u;  // FNV-1a
-  for (int y = 0; y < image.height(); ++y) {
-    for (int x = 0; x < image.width(); ++x) hash = (hash ^ image.view().at(x, y)) * 0x100000001b3u;
-  }
-  return hash;
-}
 
 Pose pose_at(double rx_deg, double ry_deg, double rz_deg, const Vec3& t) {
   Pose pose;
@@ -251,10 +244,10 @@ TEST(Render, NoiseHasTheStatedVariance) {
 TEST(Render, ThreadsAndRendererDoNotMatter) {
   const Scene scene = corpus_scene("hard", 4, 320, 240);
   const Renderer renderer(scene.camera);
-  const u64 alone = digest(render(scene));
+  const u64 alone = test::image_digest(render(scene));
   u64 first = 0, second = 0;
-  std::thread one([&] { first = digest(renderer.render(scene)); });
-  std::thread two([&] { second = digest(renderer.render(scene)); });
+  std::thread one([&] { first = test::image_digest(renderer.render(scene)); });
+  std::thread two([&] { second = test::image_digest(renderer.render(scene)); });
   one.join();
   two.join();
   EXPECT_EQ(first, alone);
@@ -270,7 +263,7 @@ TEST(Render, EverythingAtOnceHasTheGoldenBits) {
   scene.motion.turn = {0.003, 0.004, 0.002};
   scene.motion.shift = {0.001, 0, -0.002};
   add_finger(scene.foreground, {0.1, 0.1}, 0.4, 0.05, 0.2, 0.3);
-  EXPECT_EQ(digest(render(scene)), 0x6d86cd2c0ddb0211u);
+  EXPECT_EQ(test::image_digest(render(scene)), 0x6d86cd2c0ddb0211u);
 }
 
 TEST(Render, ACameraThatIsNotTheRenderersIsAnError) {

@@ -1,12 +1,9 @@
 #include "host/host_backend.hpp"
 
-#include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <new>
 
-#include "berth/error.hpp"
 #include "host/worker_pool.hpp"
 
 namespace berth::host {

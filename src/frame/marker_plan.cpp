@@ -152,7 +152,6 @@ void MarkerPlan::add_level(std::size_t index, Buffer* level_pixels, Buffer* pixe
   level.quads = make(contours * QUAD_WORDS);
   level.edges = make(contours * EDGE_WORDS);
 
-  // The step that fills the last of its buffers, or the one that `stage` names, ends a stage.
   const auto run = [&](const auto& params, std::initializer_list<Buffer*> buffers, int items) {
     steps_.push_back(make_step(params, buffers, items));
   };
