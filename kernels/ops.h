@@ -70,6 +70,7 @@ struct threshold_params {
   int height;
   int row_words; /* words of bits in a row: padded_width / 32 */
   int tile_rows;
+  int cut; /* where black ends between the darkest and the lightest pixel around, q8: 0 to 255 */
 };
 
 struct despeckle_params {

@@ -1,6 +1,6 @@
-// Adaptive threshold. Around each tile, over 3 × 3 tiles (fewer at the border), the middle of the darkest and the
-// lightest pixel parts black from white; where they differ by less than the contrast, a pixel is neither ("don't
-// care") and, like white, not set. An item makes 32 × 4 pixels: a word of each of four rows.
+// Adaptive threshold. Around each tile, over 3 × 3 tiles (fewer at the border), a level between the darkest and the
+// lightest pixel (the cut, q8: 128 is the middle) parts black from white; where they differ by less than the contrast,
+// a pixel is neither ("don't care") and, like white, not set. An item makes 32 × 4 pixels: a word of each of four rows.
 // Source: the tile threshold of AprilTag 3 (Wang & Olson 2016); SWAR per Warren, Hacker's Delight.
 KERNEL(threshold)
 IN(0, u32, pixels)  // [tile_rows * 4, row_words * 8]
@@ -44,12 +44,15 @@ BODY
         }
         low = bytes_min(low, bytes_min((low << 8) | low_left, (low >> 8) | low_right));
         high = bytes_max(high, bytes_max((high << 8) | high_left, (high >> 8) | high_right));
-        const u32 middle = (low & high) + (((low ^ high) & 0xfefefefeu) >> 1);  // per byte floor((low + high) / 2)
-        const u32 judged = bytes_ge(high - low, contrast) * 255u;               // high >= low: no borrow
+        const u32 range = high - low;  // per byte: high >= low, no borrow
+        const u32 judged = bytes_ge(range, contrast) * 255u;
+        const u32 even = ((range & 0x00ff00ffu) * U32(p.cut) >> 8) & 0x00ff00ffu;
+        const u32 odd = ((range >> 8) & 0x00ff00ffu) * U32(p.cut) & 0xff00ff00u;
+        const u32 limits = low + (even | odd);  // at most high: no carry
         const int first = tile_y * 4 * p.row_words * 8 + x * 4;
         for (int k = 0; k < 4; ++k) {
           if (((judged >> (8 * k)) & 1u) != 0u) {
-            const u32 limit = ((middle >> (8 * k)) & 255u) * 0x01010101u;
+            const u32 limit = ((limits >> (8 * k)) & 255u) * 0x01010101u;
             const int at = 16 * side + 4 * k;
             // The multiplication gathers the four flag bits in the top nibble, leftmost pixel lowest.
             row0 |= ((bytes_ge(limit, pixels[first + k]) * 0x10204080u) >> 28) << at;

@@ -26,7 +26,10 @@ struct HostOps {
 /// `threads` share an operation's groups (0: every core).
 std::unique_ptr<Backend> make_host_backend(const char* name, DeviceInfo device, const HostOps& ops, int threads);
 
-/// Name of this machine's processor.
-std::string processor_name();
+/// This machine's processor as the device of a CPU backend; `driver` says what runs on it.
+DeviceInfo processor(const std::string& driver);
+
+/// Throws Error unless options.device names the one device a CPU backend has.
+void check_device(const char* backend, const BackendOptions& options);
 
 }  // namespace berth::host

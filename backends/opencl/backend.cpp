@@ -135,6 +135,8 @@ std::vector<DeviceInfo> devices(std::string& absent_reason) {
 
 std::unique_ptr<Backend> open(const BackendOptions& options) { return std::make_unique<ClBackend>(options); }
 
+BackendEntry entry() { return {"opencl", &devices, &open}; }
+
 CacheInfo kernel_cache(const BackendOptions& options) {
   CacheInfo info{cache_folder(options.cache_dir), 0, 0};
   DIR* folder = info.path.empty() ? nullptr : opendir(info.path.c_str());

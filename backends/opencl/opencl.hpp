@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "berth/backend.hpp"
+#include "entry.hpp"
 
 /// Devices behind OpenCL 1.2. Nothing is linked: the loader is opened when it is first needed (docs/backends.md).
 namespace berth::opencl {
@@ -17,6 +18,8 @@ std::vector<DeviceInfo> devices(std::string& absent_reason);
 /// Opens the device that options.device names. Throws Error when there is no such device, naming those there are, or
 /// when its compiler rejects the kernels.
 std::unique_ptr<Backend> open(const BackendOptions& options);
+
+BackendEntry entry();
 
 /// Where compiled kernels are kept and what lies there. The path is empty when nothing can be kept: options.cache_dir,
 /// XDG_CACHE_HOME and HOME are all unset.

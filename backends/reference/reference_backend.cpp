@@ -16,4 +16,12 @@ host::HostOps ops() {
   return table;
 }
 
+BackendEntry entry() {
+  return {"reference", [](std::string&) { return std::vector<DeviceInfo>{host::processor("scalar definitions")}; },
+          [](const BackendOptions& options) {
+            host::check_device("reference", options);
+            return host::make_host_backend("reference", host::processor("scalar definitions"), ops(), 1);
+          }};
+}
+
 }  // namespace berth::reference_backend

@@ -37,4 +37,12 @@ host::HostOps ops() {
 
 const char* target_name() { return hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets()); }
 
+BackendEntry entry() {
+  return {"simd", [](std::string&) { return std::vector<DeviceInfo>{host::processor(target_name())}; },
+          [](const BackendOptions& options) {
+            host::check_device("simd", options);
+            return host::make_host_backend("simd", host::processor(target_name()), ops(), options.threads);
+          }};
+}
+
 }  // namespace berth::simd_backend

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "entry.hpp"
 #include "host/host_backend.hpp"
 
 namespace berth::simd_backend {
@@ -9,5 +10,7 @@ host::HostOps ops();
 
 /// The instruction set chosen at run time, e.g. "AVX2".
 const char* target_name();
+
+BackendEntry entry();
 
 }  // namespace berth::simd_backend

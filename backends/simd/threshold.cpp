@@ -27,9 +27,12 @@ struct TileRow {
   alignas(64) u8 limit[kMaxTiles + 2 * kMargin];
 };
 
-// Sets row.limit to the least level that is not black: middle + 1, or 0 where the tiles' contrast does not suffice.
-void find_limits(TileRow& row, const u8* const (&low)[3], const u8* const (&high)[3], std::size_t tiles, u8 contrast) {
+// Sets row.limit to the least level that is not black: one above the cut, or 0 where the tiles' contrast does not
+// suffice.
+void find_limits(TileRow& row, const u8* const (&low)[3], const u8* const (&high)[3], std::size_t tiles, u8 contrast,
+                 int cut) {
   const hn::ScalableTag<u8> bytes;
+  const hn::Repartition<std::uint16_t, decltype(bytes)> shorts;
   const std::size_t lanes = hn::Lanes(bytes);
   for (std::size_t x = 0; x < tiles; x += lanes) {
     hn::StoreU(
@@ -45,16 +48,20 @@ void find_limits(TileRow& row, const u8* const (&low)[3], const u8* const (&high
   row.high[kMargin + tiles] = row.high[kMargin + tiles - 1];
   const auto least_contrast = hn::Set(bytes, contrast);
   const auto one = hn::Set(bytes, u8{1});
+  const auto factor = hn::Set(shorts, static_cast<std::uint16_t>(cut));
+  const auto upper = hn::Set(shorts, std::uint16_t{0xff00});
   for (std::size_t x = 0; x < tiles; x += lanes) {
     const u8* l = row.low + kMargin + x;
     const u8* h = row.high + kMargin + x;
     const auto least = hn::Min(hn::Min(hn::LoadU(bytes, l - 1), hn::LoadU(bytes, l)), hn::LoadU(bytes, l + 1));
     const auto most = hn::Max(hn::Max(hn::LoadU(bytes, h - 1), hn::LoadU(bytes, h)), hn::LoadU(bytes, h + 1));
-    // AverageRound rounds up where the sum is odd; the definition rounds down.
-    const auto middle = hn::Sub(hn::AverageRound(least, most), hn::And(hn::Xor(least, most), one));
     const auto range = hn::Sub(most, least);
+    const auto pairs = hn::BitCast(shorts, range);
+    const auto even = hn::ShiftRight<8>(hn::Mul(hn::AndNot(upper, pairs), factor));
+    const auto odd = hn::And(hn::Mul(hn::ShiftRight<8>(pairs), factor), upper);
+    const auto limit = hn::Add(least, hn::BitCast(bytes, hn::Or(even, odd)));
     const auto judged = hn::Eq(hn::Max(range, least_contrast), range);
-    hn::StoreU(hn::IfThenElseZero(judged, hn::Add(middle, one)), bytes, row.limit + kMargin + x);
+    hn::StoreU(hn::IfThenElseZero(judged, hn::Add(limit, one)), bytes, row.limit + kMargin + x);
   }
 }
 
@@ -65,7 +72,7 @@ void threshold(const threshold_params& p, const u32* pixels, const u32* minima, 
 #if HWY_TARGET == HWY_SCALAR  // a processor without any vectors Highway knows
   reference::threshold(p, pixels, minima, maxima, levels, bits);
 #else
-  if (levels[3] == 0) {  // then the middle may be 255, and middle + 1 no byte
+  if (levels[3] == 0) {  // then the limit may be 255, and one above it no byte
     reference::threshold(p, pixels, minima, maxima, levels, bits);
     return;
   }
@@ -86,7 +93,7 @@ void threshold(const threshold_params& p, const u32* pixels, const u32* minima, 
       low[k] = reinterpret_cast<const u8*>(minima) + y * tiles;
       high[k] = reinterpret_cast<const u8*>(maxima) + y * tiles;
     }
-    find_limits(row, low, high, tiles, static_cast<u8>(levels[3]));
+    find_limits(row, low, high, tiles, static_cast<u8>(levels[3]), p.cut);
     const int rows = std::min(4, p.height - ty * 4);
     const u8* line = reinterpret_cast<const u8*>(pixels) + static_cast<std::size_t>(ty) * 4 * stride;
     u8* out = reinterpret_cast<u8*>(bits + static_cast<std::size_t>(ty) * 4 * static_cast<std::size_t>(p.row_words));

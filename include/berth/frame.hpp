@@ -49,7 +49,7 @@ struct FrameResult {
   /// Quadrilaterals that were examined for a code.
   int quads = 0;
   /// Run ends, contours and points of the whole image, then of the halved one.
-  std::array<CapacityUse, 6> capacities = {};
+  std::array<CapacityUse, 9> capacities = {};
   /// device: upload to download; decode; pose
   std::array<StageTime, 3> times = {};
   /// Filled only when the detector is asked for digests.

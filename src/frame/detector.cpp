@@ -1,5 +1,6 @@
 #include "berth/detector.hpp"
 
+#include <array>
 #include <chrono>
 #include <utility>
 
@@ -44,42 +45,59 @@ std::vector<const MarkerFamily*> find_families(const std::vector<std::string>& n
   return families;
 }
 
-/// One level's results on the host: in the device's memory where the host reaches it, downloaded otherwise.
-class LevelResult {
+using Corners = std::array<std::array<double, 2>, 4>;
+
+/// Whether every corner of a has one of b's within `tolerance` px, whichever comes first.
+bool same_corners(const Corners& a, const Corners& b, double tolerance) {
+  for (const auto& corner : a) {
+    bool found = false;
+    for (const auto& other : b) {
+      const double dx = corner[0] - other[0];
+      const double dy = corner[1] - other[1];
+      found = found || dx * dx + dy * dy < tolerance * tolerance;
+    }
+    if (!found) return false;
+  }
+  return true;
+}
+
+/// One search's results on the host: in the device's memory where the host reaches it, downloaded otherwise.
+class SearchResult {
  public:
-  explicit LevelResult(const MarkerLevel& level) : level_(level) {
-    if (level.quads->host() != nullptr) return;
-    contours_.resize(level.contours->bytes() / 4);
-    quads_.resize(level.quads->bytes() / 4);
-    edges_.resize(level.edges->bytes() / 4);
+  explicit SearchResult(const MarkerSearch& search) : search_(search) {
+    if (search.quads->host() != nullptr) return;
+    contours_.resize(search.contours->bytes() / 4);
+    quads_.resize(search.quads->bytes() / 4);
+    edges_.resize(search.edges->bytes() / 4);
   }
   void download(Stream& stream) {
     if (quads_.empty()) return;
-    stream.download(*level_.contours, contours_.data(), contours_.size() * 4);
-    stream.download(*level_.quads, quads_.data(), quads_.size() * 4);
-    stream.download(*level_.edges, edges_.data(), edges_.size() * 4);
+    stream.download(*search_.contours, contours_.data(), contours_.size() * 4);
+    stream.download(*search_.quads, quads_.data(), quads_.size() * 4);
+    stream.download(*search_.edges, edges_.data(), edges_.size() * 4);
   }
 
-  int slots() const { return level_.geometry.max_contours; }
+  int slots() const { return search_.geometry.max_contours; }
   /// Whether slot i holds a quadrilateral; `found` tells whether it has four corners.
   bool quad(int i, QuadCandidate& candidate, bool& found) const {
-    const s32* quad = (quads_.empty() ? static_cast<const s32*>(level_.quads->host()) : quads_.data()) + i * QUAD_WORDS;
-    const s32* edge = (edges_.empty() ? static_cast<const s32*>(level_.edges->host()) : edges_.data()) + i * EDGE_WORDS;
+    const s32* quad =
+        (quads_.empty() ? static_cast<const s32*>(search_.quads->host()) : quads_.data()) + i * QUAD_WORDS;
+    const s32* edge =
+        (edges_.empty() ? static_cast<const s32*>(search_.edges->host()) : edges_.data()) + i * EDGE_WORDS;
     if ((quad[0] & QUAD_VALID) == 0) return false;
-    found = to_candidate(quad, edge, level_.scale, candidate);
+    found = to_candidate(quad, edge, search_.scale, candidate);
     return true;
   }
   void note_capacities(CapacityUse* use) const {
-    const u32* header = contours_.empty() ? static_cast<const u32*>(level_.contours->host()) : contours_.data();
-    const MarkerGeometry& g = level_.geometry;
-    const bool whole = level_.scale == 1;
-    use[0] = {whole ? "run_ends" : "half_run_ends", header[0], static_cast<u32>(g.max_run_ends)};
-    use[1] = {whole ? "contours" : "half_contours", header[1], static_cast<u32>(g.max_contours)};
-    use[2] = {whole ? "points" : "half_points", header[2], static_cast<u32>(g.max_points)};
+    const u32* header = contours_.empty() ? static_cast<const u32*>(search_.contours->host()) : contours_.data();
+    const MarkerGeometry& g = search_.geometry;
+    use[0] = {search_.capacity_names[0], header[0], static_cast<u32>(g.max_run_ends)};
+    use[1] = {search_.capacity_names[1], header[1], static_cast<u32>(g.max_contours)};
+    use[2] = {search_.capacity_names[2], header[2], static_cast<u32>(g.max_points)};
   }
 
  private:
-  const MarkerLevel& level_;
+  const MarkerSearch& search_;
   std::vector<u32> contours_;
   std::vector<s32> quads_;
   std::vector<s32> edges_;
@@ -98,11 +116,12 @@ struct Detector::Impl {
     }
     if (plan.frame().host() == nullptr) staging.resize(plan.geometry().frame_bytes());
     std::size_t slots = 0;
-    for (const MarkerLevel& level : plan.levels()) {
-      levels.emplace_back(level);
-      slots += static_cast<std::size_t>(level.geometry.max_contours);
+    for (const MarkerSearch& search : plan.searches()) {
+      searches.emplace_back(search);
+      slots += static_cast<std::size_t>(search.geometry.max_contours);
     }
     result.detections.reserve(slots);
+    refused.reserve(slots);
     if (!staging.empty()) {  // drivers may finish compiling at the first launch: not in the first frame's time
       stream->replay(plan.plan());
       stream->finish();
@@ -122,11 +141,12 @@ struct Detector::Impl {
     pad_frame(image, g, frame());
     if (!staging.empty()) stream->upload(plan.frame(), staging.data(), staging.size());
     stream->replay(plan.plan());
-    for (LevelResult& level : levels) level.download(*stream);
+    for (SearchResult& search : searches) search.download(*stream);
   }
 
   const FrameResult& collect() {
     result.detections.clear();
+    refused.clear();
     result.digests.clear();
     result.quads = 0;
     const bool alive = stream->finish();
@@ -135,7 +155,7 @@ struct Detector::Impl {
       result.status = FrameStatus::device_lost;
       return result;
     }
-    for (const LevelResult& level : levels) decode(level);
+    for (const SearchResult& search : searches) decode(search);
     resolve_duplicates(result.detections);
     const Clock::time_point decoded = Clock::now();
     if (config.camera) {
@@ -147,7 +167,7 @@ struct Detector::Impl {
     result.times = {StageTime{"device", ns_between(started, on_host)},
                     StageTime{"decode", ns_between(on_host, decoded)}, StageTime{"pose", ns_between(decoded, posed)}};
     result.status = result.detections.empty() ? FrameStatus::no_target : FrameStatus::ok;
-    for (std::size_t i = 0; i < levels.size(); ++i) levels[i].note_capacities(&result.capacities[3 * i]);
+    for (std::size_t i = 0; i < searches.size(); ++i) searches[i].note_capacities(&result.capacities[3 * i]);
     for (const CapacityUse& use : result.capacities) {
       if (use.needed > use.capacity) result.status = FrameStatus::overflow;
     }
@@ -155,33 +175,31 @@ struct Detector::Impl {
     return result;
   }
 
-  void decode(const LevelResult& level) {
+  void decode(const SearchResult& search) {
     const MarkerGeometry& g = plan.geometry();
     const View2D<const u8> image{frame(), g.width, g.height, g.padded_width};
     QuadCandidate candidate;
     Detection detection;
-    for (int i = 0; i < level.slots(); ++i) {
+    for (int i = 0; i < search.slots(); ++i) {
       bool has_corners = false;
-      if (!level.quad(i, candidate, has_corners)) continue;
+      if (!search.quad(i, candidate, has_corners)) continue;
       ++result.quads;
       if (!has_corners || is_cut_off(candidate, g.width, g.height) || is_known(candidate)) continue;
-      if (decoder.decode(image, candidate, detection)) result.detections.push_back(detection);
+      if (decoder.decode(image, candidate, detection)) {
+        result.detections.push_back(detection);
+      } else {
+        refused.push_back(candidate.fine);
+      }
     }
   }
 
-  /// Whether a detection has these corners already: most markers are found on both levels.
+  /// Whether these corners have been decoded or refused already: most quadrilaterals are found by several searches.
   bool is_known(const QuadCandidate& candidate) const {
-    constexpr double kSame = 1.0;  // px
     for (const Detection& known : result.detections) {
-      int same = 0;
-      for (const auto& corner : candidate.fine) {
-        for (const auto& other : known.corners) {
-          const double dx = corner[0] - other[0];
-          const double dy = corner[1] - other[1];
-          if (dx * dx + dy * dy < kSame * kSame) ++same;
-        }
-      }
-      if (same == 4) return true;
+      if (same_corners(candidate.fine, known.corners, 1.0)) return true;
+    }
+    for (const Corners& known : refused) {
+      if (same_corners(candidate.fine, known, 0.25)) return true;
     }
     return false;
   }
@@ -199,7 +217,8 @@ struct Detector::Impl {
   MarkerPlan plan;
   std::unique_ptr<Stream> stream;
   std::vector<u8> staging;  // empty where the host reaches the device's memory
-  std::vector<LevelResult> levels;
+  std::vector<SearchResult> searches;
+  std::vector<Corners> refused;  // candidates of the frame that hold no marker
   FrameResult result;
   Clock::time_point started;
 };

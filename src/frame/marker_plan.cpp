@@ -24,8 +24,12 @@ constexpr int kMaxContourSide = 16000;
 // Levels of the tiles (docs/marker-pipeline.md): black and white at the 1st and 99th percentile, noise at the 25th of
 // the ranges. A tile must have 4 % of the frame's contrast and 2.5 times its noise; 18 grey levels at least in the
 // whole image, 5 in the halved one, which sees the rest with half the noise.
-constexpr normalize_params kNormalize[] = {{kHistogramGroups, 10, 990, 250, 40, 40, 18, 40},
-                                           {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40}};
+constexpr normalize_params kNormalizeWhole = {kHistogramGroups, 10, 990, 250, 40, 40, 18, 40};
+constexpr normalize_params kNormalizeHalf = {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40};
+
+// Where black ends between a neighbourhood's extremes, q8.
+constexpr int kMiddle = 128;
+constexpr int kDark = 80;
 
 int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 int clamp(long long value, int low, int high) {
@@ -89,13 +93,20 @@ MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capaciti
 }
 
 MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config) : backend_(backend) {
-  levels_.push_back({MarkerGeometry(width, height, config.capacities), 1, nullptr, nullptr, nullptr});
-  levels_.push_back(
-      {MarkerGeometry((width + 1) / 2, (height + 1) / 2, config.capacities), 2, nullptr, nullptr, nullptr});
-  frame_ = make(geometry().frame_bytes() / 4);
+  const MarkerGeometry whole(width, height, config.capacities);
+  const MarkerGeometry half((width + 1) / 2, (height + 1) / 2, config.capacities);
+  searches_ = {
+      {"", {{"run_ends", "contours", "points"}}, whole, 1, nullptr, nullptr, nullptr},
+      {"half_", {{"half_run_ends", "half_contours", "half_points"}}, half, 2, nullptr, nullptr, nullptr},
+      {"dark_", {{"dark_run_ends", "dark_contours", "dark_points"}}, half, 2, nullptr, nullptr, nullptr},
+  };
+  frame_ = make(whole.frame_bytes() / 4);
   Buffer* pixels = config.flat_field.empty() ? frame_ : add_flat_field(config.flat_field);
-  add_level(0, pixels, pixels, config);
-  add_level(1, add_halve(pixels), pixels, config);
+  add_search(0, kMiddle, pixels, add_tiles(0, pixels, kNormalizeWhole), pixels, config);
+  Buffer* half_pixels = add_halve(pixels);
+  const Tiles half_tiles = add_tiles(1, half_pixels, kNormalizeHalf);
+  add_search(1, kMiddle, half_pixels, half_tiles, pixels, config);
+  add_search(2, kDark, half_pixels, half_tiles, pixels, config);
   plan_ = backend_.record(steps_);
 }
 
@@ -119,8 +130,8 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
 }
 
 Buffer* MarkerPlan::add_halve(Buffer* pixels) {
-  const MarkerGeometry& whole = levels_[0].geometry;
-  const MarkerGeometry& half = levels_[1].geometry;
+  const MarkerGeometry& whole = searches_[0].geometry;
+  const MarkerGeometry& half = searches_[1].geometry;
   Buffer* half_pixels = make(half.frame_bytes() / 4);
   const halve_params params{whole.padded_width / 4, whole.padded_height, half.padded_width / 4, half.padded_height};
   steps_.push_back(make_step(params, {pixels, half_pixels}, params.half_row_words * params.half_rows));
@@ -128,19 +139,35 @@ Buffer* MarkerPlan::add_halve(Buffer* pixels) {
   return half_pixels;
 }
 
-void MarkerPlan::add_level(std::size_t index, Buffer* level_pixels, Buffer* pixels, const DetectorConfig& config) {
-  MarkerLevel& level = levels_[index];
-  const MarkerGeometry& g = level.geometry;
+void MarkerPlan::add_stage(std::size_t index, const char* name, Buffer* buffer, Stage::Length length) {
+  stages_.push_back({std::string(searches_[index].prefix) + name, index, buffer, length});
+}
+
+MarkerPlan::Tiles MarkerPlan::add_tiles(std::size_t index, Buffer* pixels, const normalize_params& normalize) {
+  const MarkerGeometry& g = searches_[index].geometry;
+  const int words = g.tile_rows * g.tile_row_words;
+  const Tiles tiles{make(static_cast<std::size_t>(words)), make(static_cast<std::size_t>(words)), make(4)};
+  Buffer* histograms = make(kHistogramGroups * 768);
+  add_step(make_step(tile_extrema_params{g.tile_row_words, g.tile_rows}, {pixels, tiles.minima, tiles.maxima}, words));
+  add_stage(index, "tile_minima", tiles.minima);
+  add_stage(index, "tile_maxima", tiles.maxima);
+  add_step(make_step(tile_histogram_params{words, kHistogramStep, kHistogramGroups},
+                     {tiles.minima, tiles.maxima, histograms}, kHistogramGroups * kGroupSize));
+  add_stage(index, "tile_histogram", histograms);
+  add_step(make_step(normalize, {histograms, tiles.levels}, kGroupSize));
+  add_stage(index, "normalize", tiles.levels);
+  return tiles;
+}
+
+void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, const Tiles& tiles, Buffer* pixels,
+                            const DetectorConfig& config) {
+  MarkerSearch& search = searches_[index];
+  const MarkerGeometry& g = search.geometry;
   const MarkerGeometry& whole = geometry();
   const std::size_t contours = static_cast<std::size_t>(g.max_contours);
-  const int tile_words = g.tile_rows * g.tile_row_words;
   const int base_at = g.word_groups * kGroupSize;
   const int height = g.height;
   const int row_words = g.bit_row_words;
-  Buffer* minima = make(static_cast<std::size_t>(tile_words));
-  Buffer* maxima = make(static_cast<std::size_t>(tile_words));
-  Buffer* histograms = make(kHistogramGroups * 768);
-  Buffer* levels = make(4);
   Buffer* raw_bits = make(static_cast<std::size_t>(g.bit_words));
   Buffer* bits = make(static_cast<std::size_t>(g.bit_words));
   Buffer* offsets = make(static_cast<std::size_t>(base_at + g.word_groups + 1));
@@ -148,26 +175,18 @@ void MarkerPlan::add_level(std::size_t index, Buffer* level_pixels, Buffer* pixe
   Buffer* nodes = make(static_cast<std::size_t>(g.max_run_ends));
   Buffer* spans = make(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
   Buffer* points = make(static_cast<std::size_t>(g.max_points));
-  level.contours = make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
-  level.quads = make(contours * QUAD_WORDS);
-  level.edges = make(contours * EDGE_WORDS);
+  search.contours = make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
+  search.quads = make(contours * QUAD_WORDS);
+  search.edges = make(contours * EDGE_WORDS);
 
   const auto run = [&](const auto& params, std::initializer_list<Buffer*> buffers, int items) {
-    steps_.push_back(make_step(params, buffers, items));
+    add_step(make_step(params, buffers, items));
   };
   const auto stage = [&](const char* name, Buffer* buffer, Stage::Length length = Stage::Length::whole) {
-    stages_.push_back({(index == 0 ? "" : "half_") + std::string(name), index, buffer, length});
+    add_stage(index, name, buffer, length);
   };
-  run(tile_extrema_params{g.tile_row_words, g.tile_rows}, {level_pixels, minima, maxima}, tile_words);
-  stage("tile_minima", minima);
-  stage("tile_maxima", maxima);
-  run(tile_histogram_params{tile_words, kHistogramStep, kHistogramGroups}, {minima, maxima, histograms},
-      kHistogramGroups * kGroupSize);
-  stage("tile_histogram", histograms);
-  run(kNormalize[index], {histograms, levels}, kGroupSize);
-  stage("normalize", levels);
-  run(threshold_params{g.width, height, row_words, g.tile_rows}, {level_pixels, minima, maxima, levels, raw_bits},
-      g.tile_rows * row_words);
+  run(threshold_params{g.width, height, row_words, g.tile_rows, cut},
+      {search_pixels, tiles.minima, tiles.maxima, tiles.levels, raw_bits}, g.tile_rows * row_words);
   stage("threshold", raw_bits);
   run(despeckle_params{height, row_words}, {raw_bits, bits}, g.bit_words);
   stage("despeckle", bits);
@@ -196,16 +215,16 @@ void MarkerPlan::add_level(std::size_t index, Buffer* level_pixels, Buffer* pixe
   run(scan_params{g.totals_at + g.run_groups + 1, g.run_groups}, {spans}, kGroupSize);
   stage("contour_measure", spans);
   run(contour_collect_params{height, row_words, base_at, g.totals_at, g.run_groups, g.max_contours, g.max_points},
-      {spans, offsets, level.contours}, std::max(g.run_groups * kGroupSize, g.max_contours));
-  stage("contour_collect", level.contours);
-  run(contour_trace_params{g.max_contours}, {nodes, level.contours, points}, g.max_contours);
+      {spans, offsets, search.contours}, std::max(g.run_groups * kGroupSize, g.max_contours));
+  stage("contour_collect", search.contours);
+  run(contour_trace_params{g.max_contours}, {nodes, search.contours, points}, g.max_contours);
   stage("contour_trace", points, Stage::Length::points);
-  run(quad_fit_params{g.max_contours, kMinQuadSide}, {level.contours, points, level.quads},
+  run(quad_fit_params{g.max_contours, kMinQuadSide}, {search.contours, points, search.quads},
       g.max_contours * kGroupSize);
-  stage("quad_fit", level.quads, Stage::Length::quads);
-  run(edge_refine_params{level.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},
-      {pixels, levels, level.quads, level.edges}, g.max_contours * kGroupSize);
-  stage("edge_refine", level.edges, Stage::Length::edges);
+  stage("quad_fit", search.quads, Stage::Length::quads);
+  run(edge_refine_params{search.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},
+      {pixels, tiles.levels, search.quads, search.edges}, g.max_contours * kGroupSize);
+  stage("edge_refine", search.edges, Stage::Length::edges);
 }
 
 std::size_t MarkerPlan::device_bytes() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,10 +29,15 @@ struct MarkerGeometry {
   }
 };
 
-/// What the host reads of one level of the image: the contour header and records, quads and edges (kernels/ops.h).
-struct MarkerLevel {
+/// One search for quadrilaterals: in the whole or the halved image, thresholded at one cut. The host reads its contour
+/// header and records, its quads and its edges (kernels/ops.h).
+struct MarkerSearch {
+  /// Before the names of its stages and capacities: "", "half_" or "dark_".
+  const char* prefix;
+  /// Of run ends, contours and points.
+  std::array<const char*, 3> capacity_names;
   MarkerGeometry geometry;
-  /// Pixels of the whole image a pixel of the level: 1, then 2.
+  /// Pixels of the whole image a pixel searched: 1 or 2.
   int scale;
   Buffer* contours;
   Buffer* quads;
@@ -41,22 +47,23 @@ struct MarkerLevel {
 /// One stage's output, for digests and comparison: the buffer and how many of its words the frame has written.
 struct Stage {
   std::string name;
-  std::size_t level;
+  std::size_t search;
   Buffer* buffer;
   enum class Length { whole, run_ends, points, quads, edges } length;
 };
 
 /// The docking plan: the list of operations from pixels to refined sides, with all its buffers on one backend. Markers
-/// are searched in the whole image and in the halved one, where noise and blur are half as strong: the whole image
-/// finds the small ones, the halved one the dark and noisy ones (docs/marker-pipeline.md).
+/// are searched three times: in the whole image, which finds the small ones; in the halved one, where noise and blur
+/// are half as strong; and there again with only the darkest as black, which parts a marker from its dark surroundings
+/// (docs/marker-pipeline.md).
 class MarkerPlan {
  public:
   /// Throws Error on an image size or a capacity out of bounds, an unknown family or a bad flat field.
   MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config);
 
   /// Of the whole image.
-  const MarkerGeometry& geometry() const { return levels_.front().geometry; }
-  const std::vector<MarkerLevel>& levels() const { return levels_; }
+  const MarkerGeometry& geometry() const { return searches_.front().geometry; }
+  const std::vector<MarkerSearch>& searches() const { return searches_; }
   Plan& plan() { return *plan_; }
   const std::vector<Step>& steps() const { return steps_; }
 
@@ -71,11 +78,21 @@ class MarkerPlan {
   Buffer* make(std::size_t words);
   Buffer* add_flat_field(const std::vector<float>& gains);
   Buffer* add_halve(Buffer* pixels);
-  /// From the level's pixels to its quads, and on the whole image's pixels to its edges.
-  void add_level(std::size_t index, Buffer* level_pixels, Buffer* pixels, const DetectorConfig& config);
+  /// The tiles' extrema and the levels they give, for the search `index` and those after it on the same pixels.
+  struct Tiles {
+    Buffer* minima;
+    Buffer* maxima;
+    Buffer* levels;
+  };
+  Tiles add_tiles(std::size_t index, Buffer* pixels, const normalize_params& normalize);
+  /// From pixels and their tiles to quads, and on the whole image's pixels to edges.
+  void add_search(std::size_t index, int cut, Buffer* search_pixels, const Tiles& tiles, Buffer* pixels,
+                  const DetectorConfig& config);
+  void add_step(const Step& step) { steps_.push_back(step); }
+  void add_stage(std::size_t index, const char* name, Buffer* buffer, Stage::Length length = Stage::Length::whole);
 
   Backend& backend_;
-  std::vector<MarkerLevel> levels_;
+  std::vector<MarkerSearch> searches_;
   std::vector<std::unique_ptr<Buffer>> buffers_;
   Buffer* frame_ = nullptr;
   std::vector<Step> steps_;

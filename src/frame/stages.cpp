@@ -5,10 +5,10 @@
 namespace berth {
 
 StageReader::StageReader(MarkerPlan& plan, Stream& stream) : plan_(plan), stream_(stream) {
-  for (const MarkerLevel& level : plan.levels()) {
-    levels_.emplace_back();
-    fetch(*level.contours, levels_.back().contours);
-    fetch(*level.quads, levels_.back().quads);
+  for (const MarkerSearch& search : plan.searches()) {
+    searches_.emplace_back();
+    fetch(*search.contours, searches_.back().contours);
+    fetch(*search.quads, searches_.back().quads);
   }
 }
 
@@ -21,9 +21,9 @@ std::size_t StageReader::fetch(Buffer& buffer, std::vector<u32>& words) {
 
 const std::vector<u32>& StageReader::read(std::size_t index) {
   const Stage& stage = plan_.stages()[index];
-  const std::vector<u32>& contours = levels_[stage.level].contours;
-  const std::vector<u32>& found_quads = levels_[stage.level].quads;
-  const std::size_t slots = static_cast<std::size_t>(plan_.levels()[stage.level].geometry.max_contours);
+  const std::vector<u32>& contours = searches_[stage.search].contours;
+  const std::vector<u32>& found_quads = searches_[stage.search].quads;
+  const std::size_t slots = static_cast<std::size_t>(plan_.searches()[stage.search].geometry.max_contours);
   const std::size_t size = fetch(*stage.buffer, words_);
   switch (stage.length) {
     case Stage::Length::whole:

@@ -21,11 +21,11 @@ class StageReader {
 
   MarkerPlan& plan_;
   Stream& stream_;
-  struct Level {
+  struct Search {
     std::vector<u32> contours;
     std::vector<u32> quads;
   };
-  std::vector<Level> levels_;
+  std::vector<Search> searches_;
   std::vector<u32> words_;
 };
 

@@ -6,7 +6,7 @@
 namespace berth::reference {
 
 // A pixel is black when the 3 × 3 tiles around its own (fewer at the border) differ by the contrast or more and it is
-// not above the middle, floor((darkest + lightest) / 2).
+// not above darkest + floor((lightest - darkest) * cut / 256).
 void threshold(const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima, const u32* levels,
                u32* bits) {
   const int columns = p.row_words * 8;  // of tiles
@@ -23,7 +23,8 @@ void threshold(const threshold_params& p, const u32* pixels, const u32* minima, 
           }
         }
         const bool judged = lightest - darkest >= static_cast<int>(levels[3]);
-        if (judged && byte_at(pixels, columns * 4, x, y) <= (darkest + lightest) / 2) row |= 1u << (x % 32);
+        const int limit = darkest + (lightest - darkest) * p.cut / 256;
+        if (judged && byte_at(pixels, columns * 4, x, y) <= limit) row |= 1u << (x % 32);
       }
       bits[y * p.row_words + word] = row;
     }

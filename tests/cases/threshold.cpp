@@ -4,7 +4,7 @@
 
 namespace berth::cases {
 
-// Pixels at the middle and one beside it, contrasts at the limit and one beside it, on both sides of the byte's sign.
+// Pixels at the cut and one beside it, contrasts at the limit and one beside it, on both sides of the byte's sign.
 std::vector<OpCase> threshold_cases() {
   std::vector<OpCase> cases = frame_cases(Op::threshold);
   for (const int width : {1, 31, 32, 33, 100}) {
@@ -23,14 +23,17 @@ std::vector<OpCase> threshold_cases() {
       const std::vector<std::vector<u32>> made = run_case(extrema, *reference);
       minima.assign(made[1].begin(), made[1].begin() + static_cast<std::ptrdiff_t>(tiles));
       maxima.assign(made[2].begin(), made[2].begin() + static_cast<std::ptrdiff_t>(tiles));
-      cases.push_back(make_case("width_" + std::to_string(width) + "_contrast_" + std::to_string(contrast),
-                                threshold_params{width, height, row_words, tile_rows},
-                                {pixels,
-                                 minima,
-                                 maxima,
-                                 {0, 0, 0, contrast},
-                                 std::vector<u32>(static_cast<std::size_t>(height * row_words), 5)},
-                                tile_rows * row_words));
+      for (const int cut : {0, 80, 128, 255}) {
+        cases.push_back(make_case(
+            "width_" + std::to_string(width) + "_contrast_" + std::to_string(contrast) + "_cut_" + std::to_string(cut),
+            threshold_params{width, height, row_words, tile_rows, cut},
+            {pixels,
+             minima,
+             maxima,
+             {0, 0, 0, contrast},
+             std::vector<u32>(static_cast<std::size_t>(height * row_words), 5)},
+            tile_rows * row_words));
+      }
     }
   }
   return cases;
