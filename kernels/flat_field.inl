@@ -6,7 +6,7 @@ FN u32 flat_field_pixel(u32 word, int shift, u32 gain) {
 KERNEL(flat_field)
 IN(0, u32, pixels)  // [words]
 IN(1, u32, gains)   // [words, 2]: two gains a word, u16 q12, leftmost in the low half
-OUT(2, u32, flat)   // [words]
+OUT(2, u32, even)   // [words]
 PARAMS(flat_field)
 BODY
   EACH_ITEM
@@ -14,7 +14,7 @@ BODY
       const u32 word = pixels[GID];
       const u32 left = gains[GID * 2];
       const u32 right = gains[GID * 2 + 1];
-      flat[GID] = flat_field_pixel(word, 0, left & 0xffffu) | flat_field_pixel(word, 8, left >> 16) |
+      even[GID] = flat_field_pixel(word, 0, left & 0xffffu) | flat_field_pixel(word, 8, left >> 16) |
                   flat_field_pixel(word, 16, right & 0xffffu) | flat_field_pixel(word, 24, right >> 16);
     }
   EACH_END
