@@ -68,6 +68,9 @@ class Stream {
   virtual std::unique_ptr<Event> record_event() = 0;
   /// Waits for everything enqueued. Returns false when the device was lost.
   virtual bool finish() = 0;
+  /// Runs the plan once more with each step alone on the device, and waits: what each took, ns, in the order recorded.
+  /// Empty where the device cannot tell or was lost. For looking closely, not for every frame.
+  virtual std::vector<std::int64_t> time_steps(Plan&) { return {}; }
 };
 
 struct DeviceInfo {
@@ -95,6 +98,8 @@ struct BackendOptions {
   int threads = 1;
   /// Where compiled kernels are kept; empty for $XDG_CACHE_HOME/berth or ~/.cache/berth.
   std::string cache_dir;
+  /// Keeps to what every device must have, for tests: nothing that a better one offers is used. The bits are the same.
+  bool baseline_only = false;
 };
 
 /// A backend this build knows, and what it found on this machine.
