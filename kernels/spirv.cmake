@@ -31,14 +31,15 @@ function(berth_embed_spirv out)
     message(FATAL_ERROR "The Vulkan backend needs glslangValidator and spirv-val: apt install glslang-tools spirv-tools, "
                         "or pass -DBERTH_WITH_VULKAN=OFF")
   endif()
-  file(STRINGS ${BERTH_KERNELS_DIR}/ops.h lines REGEX "^ +X\\([a-z0-9_]+\\)")
+  file(READ ${BERTH_KERNELS_DIR}/ops.h declarations)
+  string(REGEX MATCHALL "X\\([a-z0-9_]+\\)" ops "${declarations}")
   file(GLOB texts CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/*.h ${BERTH_KERNELS_DIR}/*.inl)
   list(APPEND texts ${BERTH_KERNELS_DIR}/prelude/glsl.h)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/ops.h)
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/spirv)
   set(modules "")
-  foreach(line IN LISTS lines)
-    string(REGEX REPLACE "^ +X\\(([a-z0-9_]+)\\).*" "\\1" op "${line}")
+  foreach(op IN LISTS ops)
+    string(REGEX REPLACE "X\\((.*)\\)" "\\1" op ${op})
     # file(CONFIGURE) leaves an unchanged file alone.
     file(CONFIGURE OUTPUT ${folder}/${op}.comp @ONLY CONTENT "#version 450
 #extension GL_GOOGLE_include_directive : require

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+
+#include "berth/backend.hpp"
+#include "vulkan/devices.hpp"
+
+namespace berth::vulkan {
+
+/// An open device with one queue, and what everything made on it needs.
+class Gpu {
+ public:
+  /// Opens the device that options.device names. Throws Error when there is no such, naming those there are.
+  Gpu(const BackendOptions& options, const Setup& setup);
+  ~Gpu();
+  Gpu(const Gpu&) = delete;
+  Gpu& operator=(const Gpu&) = delete;
+
+  const Api& api() const { return api_; }
+  VkDevice get() const { return logical_; }
+  const Device& device() const { return device_; }
+  const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
+  /// Whether buffers lie in memory that host and device share, cached and coherent.
+  bool unified() const { return unified_; }
+
+  /// Submits from any thread.
+  VkResult submit(const VkSubmitInfo& info, VkFence fence) const;
+  /// Records commands, runs them and waits: while setting up. Throws Error.
+  void run_once(const std::string& what, const std::function<void(VkCommandBuffer)>& record) const;
+
+  Handle<VkCommandPool> make_command_pool(VkCommandPoolCreateFlags flags) const;
+  Handle<VkFence> make_fence() const;
+
+ private:
+  explicit Gpu(const Setup& setup) : instance_(setup), api_(instance_.api()) {}
+
+  Instance instance_;
+  Api api_;
+  Device device_;
+  VkDevice logical_ = nullptr;
+  VkQueue queue_ = nullptr;
+  mutable std::mutex queue_mutex_;
+  VkPhysicalDeviceMemoryProperties memory_ = {};
+  bool unified_ = false;
+};
+
+/// A buffer with memory of its own.
+struct Memory {
+  Handle<VkDeviceMemory> memory;
+  Handle<VkBuffer> buffer;
+  void* host = nullptr;  // where the host sees it, null where it does not
+};
+
+/// Not zeroed. Throws Error when the device has no room.
+Memory make_storage(const Gpu& gpu, std::size_t bytes);
+/// Memory for copies, which the host sees without flushes; cached where there is such.
+Memory make_staging(const Gpu& gpu, std::size_t bytes);
+
+/// Everything before is visible to everything after, between the stages named.
+void barrier(const Api& api, VkCommandBuffer commands, VkPipelineStageFlags before, VkPipelineStageFlags after);
+
+}  // namespace berth::vulkan

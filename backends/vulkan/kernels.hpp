@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "berth/ops.hpp"
+#include "vulkan/gpu.hpp"
+#include "vulkan/pipeline_cache.hpp"
+
+namespace berth::vulkan {
+
+/// One operation, ready to be bound.
+struct Kernel {
+  Handle<VkDescriptorSetLayout> set_layout;  // buffer i is binding i
+  Handle<VkPipelineLayout> layout;           // that set, and the parameters as push constants
+  Handle<VkPipeline> pipeline;
+};
+
+/// Every operation's kernel, by the number of the operation.
+using Kernels = std::vector<Kernel>;
+
+/// Makes them with what the cache holds, and keeps there what it did not. Throws Error with the operation that the
+/// driver refuses.
+Kernels make_kernels(const Gpu& gpu, const PipelineCache& cache);
+
+}  // namespace berth::vulkan
