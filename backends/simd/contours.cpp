@@ -17,6 +17,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
 
+namespace hn = hwy::HWY_NAMESPACE;
+
 HWY_INLINE int node_x(u32 node) { return static_cast<int>(node & 0xffffu); }
 HWY_INLINE int node_step(u32 node) { return static_cast<int>(node) >> 16; }
 /// +1 down from an end, -1 up from a start, 0 along the row.
@@ -71,15 +73,41 @@ void contour_measure(const contour_measure_params& p, const u32* nodes, const u3
   if (seen.size() < 2 * room) seen.resize(2 * room);
   std::memset(seen.data(), 0, static_cast<std::size_t>(kept));
   if (p.want_holes != 0) std::memset(seen.data() + room, 0, static_cast<std::size_t>(kept));
-  for (int first = 0; first < kept; first += 2) {
+  const auto measure = [&](int first) {
     const int top = node_step(nodes[first]);
-    if (!((top == 1 && p.want_outer != 0) || (top == -1 && p.want_holes != 0))) continue;
     const u32 span = walk(p, nodes, first, top, seen.data() + (top == 1 ? 0 : room));
-    if (span == 0) continue;
+    if (span == 0) return;
     const int group = first / 2 / kGroupSize;
     spans[first / 2] = span;
     spans[p.totals_at + group] += 1;
     spans[p.totals_at + p.groups + 1 + group] += span & ~CONTOUR_HOLE;
+  };
+  // A run's pair of nodes tells whether a contour may begin there. One that leads straight back is a contour of its
+  // own, one row high.
+  const hn::CappedTag<u32, 8> words;
+  const int lanes = static_cast<int>(hn::Lanes(words));
+  const auto forth = hn::Set(words, 1);
+  const auto back = hn::Set(words, 0xffffu);
+  const auto too_small = hn::Set(words, p.min_side > 1 ? 0xffffu : ~0u);
+  const auto want_outer = hn::Set(words, p.want_outer != 0 ? ~0u : 0u);
+  const auto want_holes = hn::Set(words, p.want_holes != 0 ? ~0u : 0u);
+  int first = 0;
+  for (; first + 2 * lanes <= kept; first += 2 * lanes) {
+    auto starts = hn::Undefined(words);
+    auto ends = hn::Undefined(words);
+    hn::LoadInterleaved2(words, nodes + first, starts, ends);
+    starts = hn::ShiftRight<16>(starts);
+    ends = hn::ShiftRight<16>(ends);
+    const auto outer =
+        hn::And(hn::VecFromMask(words, hn::And(hn::Eq(starts, forth), hn::Ne(ends, too_small))), want_outer);
+    const auto holes = hn::And(hn::VecFromMask(words, hn::Eq(starts, back)), want_holes);
+    u8 mask[8] = {};
+    hn::StoreMaskBits(words, hn::MaskFromVec(hn::Or(outer, holes)), mask);
+    for (unsigned tops = mask[0]; tops != 0; tops &= tops - 1) measure(first + 2 * __builtin_ctz(tops));
+  }
+  for (; first < kept; first += 2) {
+    const int top = node_step(nodes[first]);
+    if ((top == 1 && p.want_outer != 0) || (top == -1 && p.want_holes != 0)) measure(first);
   }
 }
 

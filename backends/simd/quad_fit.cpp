@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstring>
 #include <vector>
 
 #include "simd/simd_ops.hpp"
@@ -31,29 +32,49 @@ struct Points {
   s32 area = 0;
   s32 x_min = 0, x_max = 0, y_min = 0, y_max = 0;
 
-  void load(const u32* points, int count) {
-    const std::size_t room = static_cast<std::size_t>(count) * 2 + 64;
+  /// Reads up to a vector past the last point, as the buffers of CPU backends allow.
+  HWY_ATTR void load(const u32* words, int count) {
+    const std::size_t n = static_cast<std::size_t>(count);
+    const std::size_t room = n * 2 + 64;
     if (x.size() < room) {
       x.resize(room);
       y.resize(room);
       boundary.resize(room);
     }
-    area = 0;
-    x_min = y_min = 1 << 30;
-    x_max = y_max = 0;
-    for (int i = 0; i < count; ++i) {
-      const s32 px = static_cast<s32>(points[i] & 0xffffu);
-      const s32 py = static_cast<s32>(points[i] >> 16);
-      const s32 is_end = py & 1;
-      x[static_cast<std::size_t>(i)] = x[static_cast<std::size_t>(i + count)] = px;
-      y[static_cast<std::size_t>(i)] = y[static_cast<std::size_t>(i + count)] = py | 1;
-      boundary[static_cast<std::size_t>(i)] = boundary[static_cast<std::size_t>(i + count)] = py + is_end;
-      area += is_end != 0 ? px / 2 : -(px / 2);
-      x_min = std::min(x_min, px);
-      x_max = std::max(x_max, px);
-      y_min = std::min(y_min, py | 1);
-      y_max = std::max(y_max, py | 1);
+    const hn::ScalableTag<s32> lanes;
+    const std::size_t step = hn::Lanes(lanes);
+    const auto one = hn::Set(lanes, 1);
+    auto sum = hn::Zero(lanes);
+    auto least_x = hn::Set(lanes, 1 << 30);
+    auto least_y = least_x;
+    auto most_x = hn::Zero(lanes);
+    auto most_y = most_x;
+    for (std::size_t i = 0; i < n; i += step) {
+      const auto word = hn::LoadU(lanes, reinterpret_cast<const s32*>(words) + i);
+      const auto px = hn::And(word, hn::Set(lanes, 0xffff));
+      const auto py = hn::ShiftRight<16>(word);
+      const auto centre = hn::Or(py, one);
+      const auto is_end = hn::And(py, one);
+      hn::StoreU(px, lanes, &x[i]);
+      hn::StoreU(centre, lanes, &y[i]);
+      hn::StoreU(hn::Add(py, is_end), lanes, &boundary[i]);
+      const auto valid = hn::FirstN(lanes, n - i);
+      const auto half = hn::ShiftRight<1>(px);
+      const auto sign = hn::Sub(is_end, one);  // 0 for ends, -1 for starts, whose crack counts negative
+      sum = hn::Add(sum, hn::IfThenElseZero(valid, hn::Sub(hn::Xor(half, sign), sign)));
+      least_x = hn::Min(least_x, hn::IfThenElse(valid, px, least_x));
+      least_y = hn::Min(least_y, hn::IfThenElse(valid, centre, least_y));
+      most_x = hn::Max(most_x, hn::IfThenElseZero(valid, px));
+      most_y = hn::Max(most_y, hn::IfThenElseZero(valid, centre));
     }
+    std::memcpy(&x[n], x.data(), n * sizeof(s32));
+    std::memcpy(&y[n], y.data(), n * sizeof(s32));
+    std::memcpy(&boundary[n], boundary.data(), n * sizeof(s32));
+    area = hn::GetLane(hn::SumOfLanes(lanes, sum));
+    x_min = hn::GetLane(hn::MinOfLanes(lanes, least_x));
+    y_min = hn::GetLane(hn::MinOfLanes(lanes, least_y));
+    x_max = hn::GetLane(hn::MaxOfLanes(lanes, most_x));
+    y_max = hn::GetLane(hn::MaxOfLanes(lanes, most_y));
   }
 };
 
@@ -292,9 +313,11 @@ class Quad {
 };
 
 void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads) {
-  static thread_local Points loaded;
+  static thread_local Points kept;
+  Points& loaded = kept;
   const u32* record = contours + CONTOUR_HEADER;
-  for (int slot = 0; slot < p.max_contours; ++slot, record += CONTOUR_WORDS, quads += QUAD_WORDS) {
+  const int filled = static_cast<int>(std::min(contours[1], static_cast<u32>(p.max_contours)));
+  for (int slot = 0; slot < filled; ++slot, record += CONTOUR_WORDS, quads += QUAD_WORDS) {
     const int count = static_cast<int>(record[1] & ~CONTOUR_HOLE);
     const bool hole = (record[1] & CONTOUR_HOLE) != 0;
     quads[0] = 0;
@@ -302,6 +325,7 @@ void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, 
     loaded.load(points + record[3], count);
     if (Quad(loaded, count, hole, p.min_side_px).fit(quads)) quads[0] = hole ? QUAD_VALID | QUAD_HOLE : QUAD_VALID;
   }
+  for (int slot = filled; slot < p.max_contours; ++slot, quads += QUAD_WORDS) quads[0] = 0;
 }
 
 }  // namespace berth::simd_backend::HWY_NAMESPACE

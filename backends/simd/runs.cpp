@@ -48,30 +48,45 @@ void run_count(const run_count_params& p, const u32* bits, u32* offsets) {
   offsets[p.base_at + groups - 1] = before;
 }
 
-void run_emit(const run_emit_params& p, const u32* bits, const u32* offsets, u32* cracks) {
-  u32* out = cracks;
-  for (int y = 0; y < p.height; ++y) {
-    const u32 row_end = reference::run_ends_before(offsets, p.base_at, (y + 1) * p.row_words);
-    if (row_end > static_cast<u32>(p.capacity)) return;
-    if (cracks + row_end == out) continue;
-    const u32* row = bits + static_cast<std::ptrdiff_t>(y) * p.row_words;
-    u32 carry = 0;
-    for (int x = 0; x < p.row_words; ++x) {
-      const u32 here = row[x];
-      for (u32 edges = here ^ ((here << 1) | carry); edges != 0; edges &= edges - 1) {
-        *out++ = static_cast<u32>(x * 32) + static_cast<u32>(__builtin_ctz(edges));
-      }
-      carry = here >> 31;
-    }
-    if (carry != 0) *out++ = static_cast<u32>(p.row_words * 32);
-  }
-}
-
 /// 64 bits of a row from word x on; past the row's end zeros.
 HWY_INLINE u64 wide_word(const u32* row, int x, int row_words) {
   u64 word = row[x];
   if (x + 1 < row_words) word |= static_cast<u64>(row[x + 1]) << 32;
   return word;
+}
+
+void run_emit(const run_emit_params& p, const u32* bits, const u32* offsets, u32* cracks) {
+  constexpr int kBatch = 4;
+  u32* out = cracks;
+  for (int y = 0; y < p.height; ++y) {
+    const u32 row_end = reference::run_ends_before(offsets, p.base_at, (y + 1) * p.row_words);
+    if (row_end > static_cast<u32>(p.capacity)) return;
+    u32* const end = cracks + row_end;
+    if (end == out) continue;
+    const u32* row = bits + static_cast<std::ptrdiff_t>(y) * p.row_words;
+    u64 carry = 0;
+    for (int x = 0; x < p.row_words; x += 2) {
+      const u64 here = wide_word(row, x, p.row_words);
+      u64 edges = here ^ ((here << 1) | carry);
+      carry = here >> 63;
+      const u32 first = static_cast<u32>(x * 32);
+      const int count = static_cast<int>(popcount(edges));
+      u32* next = out;
+      // Whole batches, the last of them too long: what is too much is written again by what follows in the row. The
+      // number of rounds is easier to foresee than the number of edges.
+      for (int done = 0; done < count && end - next >= kBatch; done += kBatch) {
+        for (int i = 0; i < kBatch; ++i) {
+          next[i] = first + static_cast<u32>(__builtin_ctzll(edges | (u64{1} << 63)));
+          edges &= edges - 1;
+        }
+        next += kBatch;
+      }
+      for (; edges != 0; edges &= edges - 1) *next++ = first + static_cast<u32>(__builtin_ctzll(edges));
+      out += count;
+    }
+    // A row that ends black ends with the last crack of its padded width.
+    if (out != end) *out++ = static_cast<u32>(p.row_words * 32);
+  }
 }
 
 /// Overwrites the step of a node (its high half) and leaves the crack.

@@ -1,7 +1,9 @@
 #include "berth/detector.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "berth/error.hpp"
@@ -47,14 +49,16 @@ std::vector<const MarkerFamily*> find_families(const std::vector<std::string>& n
 
 using Corners = std::array<std::array<double, 2>, 4>;
 
+double square_distance(const std::array<double, 2>& a, const std::array<double, 2>& b) {
+  return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
+}
+
 /// Whether every corner of a has one of b's within `tolerance` px, whichever comes first.
 bool same_corners(const Corners& a, const Corners& b, double tolerance) {
   for (const auto& corner : a) {
     bool found = false;
     for (const auto& other : b) {
-      const double dx = corner[0] - other[0];
-      const double dy = corner[1] - other[1];
-      found = found || dx * dx + dy * dy < tolerance * tolerance;
+      found = found || square_distance(corner, other) < tolerance * tolerance;
     }
     if (!found) return false;
   }
@@ -77,7 +81,8 @@ class SearchResult {
     stream.download(*search_.edges, edges_.data(), edges_.size() * 4);
   }
 
-  int slots() const { return search_.geometry.max_contours; }
+  /// How many slots the frame has filled.
+  int slots() const { return static_cast<int>(std::min(header()[1], static_cast<u32>(search_.geometry.max_contours))); }
   /// Whether slot i holds a quadrilateral; `found` tells whether it has four corners.
   bool quad(int i, QuadCandidate& candidate, bool& found) const {
     const s32* quad =
@@ -89,14 +94,17 @@ class SearchResult {
     return true;
   }
   void note_capacities(CapacityUse* use) const {
-    const u32* header = contours_.empty() ? static_cast<const u32*>(search_.contours->host()) : contours_.data();
     const MarkerGeometry& g = search_.geometry;
-    use[0] = {search_.capacity_names[0], header[0], static_cast<u32>(g.max_run_ends)};
-    use[1] = {search_.capacity_names[1], header[1], static_cast<u32>(g.max_contours)};
-    use[2] = {search_.capacity_names[2], header[2], static_cast<u32>(g.max_points)};
+    use[0] = {search_.capacity_names[0], header()[0], static_cast<u32>(g.max_run_ends)};
+    use[1] = {search_.capacity_names[1], header()[1], static_cast<u32>(g.max_contours)};
+    use[2] = {search_.capacity_names[2], header()[2], static_cast<u32>(g.max_points)};
   }
 
  private:
+  const u32* header() const {
+    return contours_.empty() ? static_cast<const u32*>(search_.contours->host()) : contours_.data();
+  }
+
   const MarkerSearch& search_;
   std::vector<u32> contours_;
   std::vector<s32> quads_;
@@ -196,7 +204,8 @@ struct Detector::Impl {
   /// Whether these corners have been decoded or refused already: most quadrilaterals are found by several searches.
   bool is_known(const QuadCandidate& candidate) const {
     for (const Detection& known : result.detections) {
-      if (same_corners(candidate.fine, known.corners, 1.0)) return true;
+      const double side = std::sqrt(square_distance(known.corners[0], known.corners[1]));
+      if (same_corners(candidate.fine, known.corners, std::min(2.0, std::max(1.0, side / 10)))) return true;
     }
     for (const Corners& known : refused) {
       if (same_corners(candidate.fine, known, 0.25)) return true;

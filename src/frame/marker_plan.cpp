@@ -86,7 +86,7 @@ MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capaciti
   word_groups = bit_words / kGroupSize + 1;
   const long long area = static_cast<long long>(width) * height;
   max_run_ends = round_up(capacity("run_ends", wanted.run_ends, area / 4, 4096, 1 << 25), 2 * kGroupSize);
-  max_contours = capacity("contours", wanted.contours, area / 512, 1024, 16384);
+  max_contours = capacity("contours", wanted.contours, area / 512, 256, 16384);
   max_points = capacity("points", wanted.points, area / 4, 65536, 1 << 22);
   run_groups = max_run_ends / 2 / kGroupSize;
   totals_at = run_groups * kGroupSize;

@@ -122,6 +122,26 @@ u64 signs(const Levels& levels, std::size_t n) {
   return word;
 }
 
+// Words that are looked through one by one for near ones: a few microseconds' worth.
+constexpr std::size_t kMaxNearScan = 20000;
+
+// Whether any word with at most `distance` bits other than `seen` is likely; true without a look at a longer list. What
+// match_levels accepts is such a word, so this only saves it the work on patterns that are no codes.
+template <class Likely>
+bool any_likely(const std::vector<u64>& words, u64 seen, int distance, const Likely& likely) {
+  if (words.size() > kMaxNearScan) return true;
+  constexpr std::size_t kBlock = 64;
+  std::array<u8, kBlock> bits;
+  for (std::size_t begin = 0; begin < words.size(); begin += kBlock) {
+    const std::size_t size = std::min(kBlock, words.size() - begin);
+    for (std::size_t i = 0; i < size; ++i) bits[i] = static_cast<u8>(count_bits(words[begin + i] ^ seen));
+    for (std::size_t i = 0; i < size; ++i) {
+      if (bits[i] <= distance && likely(words[begin + i])) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 CodeMatcher::CodeMatcher(const MarkerFamily& family, const Layout& layout, int max_hamming)
@@ -155,6 +175,13 @@ CodeMatch CodeMatcher::match_levels(const Layout& layout, const Reading& reading
 
   Levels sharp;
   sharpen(layout, reading, blur_taps(reading, kUsualBlur_px), sharp);
+  const u64 seen = signs(sharp, n);
+  if (!any_likely(book_.words(), seen, correctable_ + kSoftBits, [&](u64 word) {
+        BlurTaps taps;
+        return centred.best_likeness(layout, reading, word, taps) >= levels_likeness_;
+      })) {
+    return none;
+  }
   const ShortList list = likely_words(book_, sharp, reading.half_contrast);
 
   CodeMatch best;
@@ -178,7 +205,7 @@ CodeMatch CodeMatcher::match_levels(const Layout& layout, const Reading& reading
   const double ratio = (1 - rival) / std::max(1 - best.likeness, 1e-9);
   if (power(ratio, static_cast<int>(n)) < kRivalOdds) return none;
   if (evidence_against_chance(layout, reading, book_.words()[best.entry], taps) < least_evidence_) return none;
-  best.hamming = count_bits(signs(sharp, n) ^ book_.words()[best.entry]);
+  best.hamming = count_bits(seen ^ book_.words()[best.entry]);
   // A second guard beside the evidence: on rendered clutter a pattern nine bits from any code passed it once in 700
   // frames. Two bits past what the family corrects keeps nearly all small markers (97.2 of 97.6 %) and none of those.
   if (best.hamming > correctable_ + kSoftBits) return none;
