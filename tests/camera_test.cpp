@@ -1,7 +1,6 @@
 #include "berth/camera.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -10,14 +9,15 @@
 #include <string>
 
 #include "berth/error.hpp"
+#include "support/scratch_folder.hpp"
 #include "target/number_text.hpp"
 
 namespace berth {
 namespace {
 
-// ctest runs tests side by side, each in a process of its own.
 std::string temporary(const std::string& name) {
-  return testing::TempDir() + "berth_camera_" + std::to_string(getpid()) + "_" + name;
+  static const test::ScratchFolder folder;
+  return folder / name;
 }
 
 std::string write_text(const std::string& name, const std::string& text) {

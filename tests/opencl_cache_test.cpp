@@ -13,6 +13,7 @@
 #include "kernel_text.hpp"
 #include "opencl/opencl.hpp"
 #include "opencl/program.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace berth::opencl {
 namespace {
@@ -22,13 +23,7 @@ using Bytes = std::vector<unsigned char>;
 
 class OpenclCache : public ::testing::Test {
  protected:
-  OpenclCache() {
-    std::string pattern = (fs::temp_directory_path() / "berth-cache-XXXXXX").string();
-    root_ = mkdtemp(pattern.data());
-  }
-  ~OpenclCache() override { fs::remove_all(root_); }
-
-  std::string folder(const std::string& name) const { return (root_ / name).string(); }
+  std::string folder(const std::string& name) const { return scratch_ / name; }
   static Bytes read(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
@@ -41,7 +36,7 @@ class OpenclCache : public ::testing::Test {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator()));
   }
 
-  fs::path root_;
+  test::ScratchFolder scratch_;
 };
 
 const Bytes kBinary = {0, 1, 2, 253, 254, 255, 10, 13};

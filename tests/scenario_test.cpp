@@ -11,6 +11,7 @@
 
 #include "berth/error.hpp"
 #include "sim/geometry.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace berth {
 namespace {
@@ -18,10 +19,8 @@ namespace {
 const std::string kScenarios = std::string(BERTH_SOURCE_DIR) + "/scenarios/";
 
 std::string written(const std::string& text) {
-  std::string path =
-      testing::TempDir() + "berth_scenario_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
-  std::ofstream(path) << text;
-  return path;
+  static const test::ScratchFolder folder;
+  return folder.write("scenario.toml", text);
 }
 
 std::string error_of(const std::string& path) {
