@@ -30,14 +30,17 @@ Device pick(const Api& api, const BackendOptions& options) {
 
 class CudaBackend final : public Backend {
  public:
-  CudaBackend(const Api& api, const Device& device)
-      : device_(device), context_(api, device.handle, device.name), info_(info_of(api, device)) {
+  CudaBackend(const Api& api, const Device& device, bool baseline_only)
+      : device_(device),
+        context_(api, device.handle, device.name),
+        info_(info_of(api, device)),
+        use_graphs_(api.has_graphs && !baseline_only) {
     const Current current(context_);
     current.require();
     CUstream stream = nullptr;
     check(api, api.cuStreamCreate(&stream, kStreamNonBlocking), "making a stream on " + device_.name);
     setup_stream_ = {context_, stream, api.cuStreamDestroy_v2};
-    module_ = load_kernels(context_, device_);
+    module_ = load_kernels(context_, device_, baseline_only);
     for (const Op op : all_ops()) {
       const std::string name = std::string("berth_") + name_of(op);  // see kernels/prelude/cuda.h
       CUfunction function = nullptr;
@@ -69,10 +72,8 @@ class CudaBackend final : public Backend {
 
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
     auto plan = std::make_unique<CudaPlan>();
-    for (const Step& step : steps) {
-      if (step.items > 0) plan->launches.push_back(launch_of(step));
-    }
-    if (context_.api().has_graphs && !plan->launches.empty()) plan->graph = make_graph(plan->launches);
+    for (const Step& step : steps) plan->launches.push_back(launch_of(step));
+    if (use_graphs_) plan->graph = make_graph(plan->launches);
     return plan;
   }
 
@@ -84,7 +85,7 @@ class CudaBackend final : public Backend {
     }
     Launch launch;
     launch.function = functions_[static_cast<std::size_t>(step.op)];
-    launch.groups = (static_cast<unsigned>(step.items) + kGroupSize - 1) / kGroupSize;
+    launch.groups = step.items <= 0 ? 0 : (static_cast<unsigned>(step.items) + kGroupSize - 1) / kGroupSize;
     for (Buffer* buffer : step.buffers) {
       const auto* mine = dynamic_cast<const CudaBuffer*>(buffer);
       if (mine == nullptr || mine->context() != &context_) {
@@ -108,6 +109,7 @@ class CudaBackend final : public Backend {
     const Handle<CUgraph> graph(context_, made, api.cuGraphDestroy);
     CUgraphNode last = nullptr;
     for (Launch& launch : launches) {
+      if (launch.groups == 0) continue;
       const KernelNodeParams params = {launch.function,         launch.groups, 1, 1, kGroupSize, 1, 1, 0,
                                        launch.arguments.data(), nullptr};
       CUgraphNode node = nullptr;
@@ -124,6 +126,7 @@ class CudaBackend final : public Backend {
   Device device_;
   Context context_;
   DeviceInfo info_;
+  bool use_graphs_;
   Handle<CUstream> setup_stream_;
   Handle<CUmodule> module_;
   std::vector<CUfunction> functions_;         // by Op
@@ -146,7 +149,7 @@ std::vector<DeviceInfo> devices(std::string& absent_reason) {
 
 std::unique_ptr<Backend> open(const BackendOptions& options) {
   const Api api = load_api();
-  return std::make_unique<CudaBackend>(api, pick(api, options));
+  return std::make_unique<CudaBackend>(api, pick(api, options), options.baseline_only);
 }
 
 BackendEntry entry() { return {"cuda", &devices, &open}; }

@@ -55,6 +55,9 @@ Api resolve() {
   if (missing == nullptr && api.cuDevicePrimaryCtxRelease_v2 == nullptr && api.cuDevicePrimaryCtxRelease == nullptr) {
     missing = "cuDevicePrimaryCtxRelease";
   }
+  if (missing == nullptr && api.cuEventElapsedTime_v2 == nullptr && api.cuEventElapsedTime == nullptr) {
+    missing = "cuEventElapsedTime";
+  }
   if (missing != nullptr) {
     throw Error("cuda: " + name + " lacks " + missing + "; Berth needs a driver for CUDA " +
                 version_text(kOldestDriver) + " or later");
@@ -72,6 +75,10 @@ Api resolve() {
 CUresult Api::release_primary_context(CUdevice device) const {
   return cuDevicePrimaryCtxRelease_v2 != nullptr ? cuDevicePrimaryCtxRelease_v2(device)
                                                  : cuDevicePrimaryCtxRelease(device);
+}
+
+CUresult Api::elapsed(float* ms, CUevent from, CUevent to) const {
+  return cuEventElapsedTime_v2 != nullptr ? cuEventElapsedTime_v2(ms, from, to) : cuEventElapsedTime(ms, from, to);
 }
 
 CUresult Api::instantiate(CUgraphExec* exec, CUgraph graph) const {

@@ -6,7 +6,7 @@
 /// What Berth uses of the CUDA driver API, declared here so that building needs no CUDA headers and running no CUDA
 /// runtime. These are the documented functions of cuda.h under the names libcuda.so.1 exports; a versioned name (_v2)
 /// stands for one signature for good, so drivers from CUDA 10.2 to today's run the same program.
-/// tests/cuda_abi_test.cpp compares every declaration with cuda.h where there is one.
+/// tests/fake_cuda/abi_check.cpp compares every declaration with cuda.h where there is one.
 namespace berth::cuda {
 
 using CUresult = int;  // an enum there
@@ -41,6 +41,7 @@ constexpr int kJitErrorLogBuffer = 5;
 constexpr int kJitErrorLogBufferBytes = 6;
 constexpr unsigned kStreamNonBlocking = 1;
 constexpr unsigned kEventDisableTiming = 2;
+constexpr unsigned kEventTiming = 0;
 
 /// X(name, parameters): what every driver since CUDA 10.2 has.
 #define BERTH_CUDA_FUNCTIONS(X)                                                                                  \
@@ -86,6 +87,8 @@ constexpr unsigned kEventDisableTiming = 2;
 
 /// Functions that were renamed: the first one of a group that the driver has is called.
 #define BERTH_CUDA_RENAMED_FUNCTIONS(X)                                                                            \
+  X(cuEventElapsedTime_v2, (float* ms, CUevent from, CUevent to))                                                  \
+  X(cuEventElapsedTime, (float* ms, CUevent from, CUevent to))                                                     \
   X(cuDevicePrimaryCtxRelease_v2, (CUdevice device))                                                               \
   X(cuDevicePrimaryCtxRelease, (CUdevice device))                                                                  \
   X(cuGraphInstantiateWithFlags, (CUgraphExec * exec, CUgraph graph, unsigned long long flags))                    \
@@ -103,6 +106,7 @@ struct Api {
   bool has_graphs = false;
 
   CUresult release_primary_context(CUdevice device) const;
+  CUresult elapsed(float* ms, CUevent from, CUevent to) const;
   CUresult instantiate(CUgraphExec* exec, CUgraph graph) const;
 };
 

@@ -1,15 +1,18 @@
 #include "cuda/module.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
 #include "berth/error.hpp"
 
 namespace berth::cuda {
 
-Handle<CUmodule> load_kernels(const Context& context, const Device& device) {
+Handle<CUmodule> load_kernels(const Context& context, const Device& device, bool baseline_only) {
   const Api& api = context.api();
   std::string refused;
-  for (const Image& image : device_images()) {
+  std::vector<Image> images = device_images();
+  if (baseline_only) std::reverse(images.begin(), images.end());
+  for (const Image& image : images) {
     if (device.capability < image.least_capability) continue;
     std::string log(8192, '\0');
     int options[] = {kJitErrorLogBuffer, kJitErrorLogBufferBytes};

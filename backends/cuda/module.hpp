@@ -19,8 +19,8 @@ struct Image {
 /// In the order they are tried.
 const std::vector<Image>& device_images();
 
-/// The kernels on a device, from the first image that the driver takes. Throws Error with the driver's log when it
-/// takes none. The context is current.
-Handle<CUmodule> load_kernels(const Context& context, const Device& device);
+/// The kernels on a device, from the first image that the driver takes, or the last if it is to be what every device
+/// runs. Throws Error with the driver's log when it takes none. The context is current.
+Handle<CUmodule> load_kernels(const Context& context, const Device& device, bool baseline_only);
 
 }  // namespace berth::cuda

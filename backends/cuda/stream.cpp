@@ -60,12 +60,37 @@ class Queue {
     enqueue([&](const Api& api) {
       if (plan.graph.get() != nullptr) return api.cuGraphLaunch(plan.graph.get(), stream_.get());
       for (const Launch& launch : plan.launches) {
-        const CUresult status = api.cuLaunchKernel(launch.function, launch.groups, 1, 1, kGroupSize, 1, 1, 0,
-                                                   stream_.get(), const_cast<void**>(launch.arguments.data()), nullptr);
+        const CUresult status = start(launch);
         if (status != kSuccess) return status;
       }
       return kSuccess;
     });
+  }
+
+  std::vector<std::int64_t> time_steps(const CudaPlan& plan) {
+    std::vector<std::int64_t> times;
+    enqueue([&](const Api& api) {
+      Handle<CUevent> marks[2];
+      for (Handle<CUevent>& mark : marks) {
+        CUevent event = nullptr;
+        const CUresult status = api.cuEventCreate(&event, kEventTiming);
+        if (status != kSuccess) return status;
+        mark = {context_, event, api.cuEventDestroy_v2};
+      }
+      for (const Launch& launch : plan.launches) {
+        float ms = 0;
+        CUresult status = api.cuEventRecord(marks[0].get(), stream_.get());
+        if (status == kSuccess) status = start(launch);
+        if (status == kSuccess) status = api.cuEventRecord(marks[1].get(), stream_.get());
+        if (status == kSuccess) status = api.cuEventSynchronize(marks[1].get());
+        if (status == kSuccess) status = api.elapsed(&ms, marks[0].get(), marks[1].get());
+        if (status != kSuccess) return status;
+        times.push_back(static_cast<std::int64_t>(static_cast<double>(ms) * 1e6));
+      }
+      return kSuccess;
+    });
+    if (is_lost()) times.clear();
+    return times;
   }
 
   /// An event, and how many copies come before it. No event when the stream is lost.
@@ -127,6 +152,12 @@ class Queue {
     lost_ = current.status() != kSuccess || action(context_.api()) != kSuccess;
   }
 
+  CUresult start(const Launch& launch) const {
+    if (launch.groups == 0) return kSuccess;
+    return context_.api().cuLaunchKernel(launch.function, launch.groups, 1, 1, kGroupSize, 1, 1, 0, stream_.get(),
+                                         const_cast<void**>(launch.arguments.data()), nullptr);
+  }
+
   bool is_lost() {
     const std::lock_guard<std::mutex> lock(mutex_);
     return lost_;
@@ -179,6 +210,9 @@ class CudaStream final : public Stream {
     return std::make_unique<CudaEvent>(queue_, std::move(event), copies);
   }
   bool finish() override { return queue_->finish(); }
+  std::vector<std::int64_t> time_steps(Plan& plan) override {
+    return queue_->time_steps(static_cast<const CudaPlan&>(plan));
+  }
 
  private:
   std::shared_ptr<Queue> queue_;

@@ -31,7 +31,7 @@ class CudaBuffer final : public Buffer {
 /// One kernel with its arguments. It may move: the pointers are into the vectors' memory.
 struct Launch {
   CUfunction function = nullptr;
-  unsigned groups = 0;
+  unsigned groups = 0;  // none: it is left out
   std::vector<CUdeviceptr> buffers;
   std::vector<std::byte> params;
   std::vector<void*> arguments;  // to each of the buffers, then to the params
@@ -39,8 +39,8 @@ struct Launch {
 
 class CudaPlan final : public Plan {
  public:
-  std::vector<Launch> launches;
-  Handle<CUgraphExec> graph;  // all of the launches; none where the driver has no graphs
+  std::vector<Launch> launches;  // one a step
+  Handle<CUgraphExec> graph;     // all of the launches; none where they are launched one by one
 };
 
 /// An in-order queue. From the first call that fails on it is lost, for good: arguments were checked while setting up,

@@ -340,8 +340,12 @@ DRIVER cuStreamDestroy_v2(CUstream stream) {
 
 DRIVER cuEventCreate(CUevent* event, unsigned flags) {
   ENTER_CONTEXT("cuEventCreate");
-  if (flags != kEventDisableTiming) return machine().complain(kInvalidValue, "cuEventCreate: flags");
-  *event = reinterpret_cast<CUevent>(machine().own(machine().events, std::make_shared<EventState>()));
+  if (flags != kEventDisableTiming && flags != kEventTiming) {
+    return machine().complain(kInvalidValue, "cuEventCreate: flags");
+  }
+  auto made = std::make_shared<EventState>();
+  made->timed = flags == kEventTiming;
+  *event = reinterpret_cast<CUevent>(machine().own(machine().events, made));
   return kSuccess;
 }
 DRIVER cuEventRecord(CUevent event, CUstream stream) {
@@ -349,7 +353,14 @@ DRIVER cuEventRecord(CUevent event, CUstream stream) {
   const std::shared_ptr<EventState> recorded = find(machine().events, event, "cuEventRecord");
   const std::shared_ptr<Queue> queue = find(machine().streams, stream, "cuEventRecord");
   if (recorded == nullptr || queue == nullptr) return kInvalidHandle;
-  *recorded = {queue, queue->taken};
+  if (recorded->timed) {
+    machine().enqueue(queue, [recorded] {
+      const Lock at_work(machine().mutex);
+      recorded->when = std::chrono::steady_clock::now();
+    });
+  }
+  recorded->queue = queue;
+  recorded->after = queue->taken;
   return kSuccess;
 }
 DRIVER cuEventSynchronize(CUevent event) {
@@ -361,6 +372,26 @@ DRIVER cuEventSynchronize(CUevent event) {
   machine().changed.wait(lock, [&] { return state.queue->done >= state.after; });
   return machine().lost;
 }
+static CUresult elapsed(const char* function, float* ms, CUevent from, CUevent to) {
+  ENTER_CONTEXT(function);
+  const std::shared_ptr<EventState> first = find(machine().events, from, function);
+  const std::shared_ptr<EventState> last = find(machine().events, to, function);
+  if (first == nullptr || last == nullptr) return kInvalidHandle;
+  for (const auto& event : {first, last}) {
+    if (!event->timed || event->queue == nullptr || event->queue->done < event->after) {
+      return machine().complain(kInvalidHandle, std::string(function) + ": no time was taken");
+    }
+  }
+  *ms = std::chrono::duration<float, std::milli>(last->when - first->when).count();
+  return kSuccess;
+}
+#if FAKE_CUDA_VERSION >= 12
+DRIVER cuEventElapsedTime_v2(float* ms, CUevent from, CUevent to) {
+  return elapsed("cuEventElapsedTime_v2", ms, from, to);
+}
+#else
+DRIVER cuEventElapsedTime(float* ms, CUevent from, CUevent to) { return elapsed("cuEventElapsedTime", ms, from, to); }
+#endif
 DRIVER cuEventDestroy_v2(CUevent event) { return give_back("cuEventDestroy_v2", machine().events, event); }
 
 DRIVER cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, unsigned grid_z, unsigned block_x,

@@ -23,6 +23,7 @@
   X(void, fake_cuda_hold, (bool held))                                                                                \
   /* Refuses images of that kind, "fatbin" or "ptx", with a status and a log. */                                      \
   X(void, fake_cuda_refuse, (const char* kind, int status, const char* log))                                          \
+  X(int, fake_cuda_all_calls, ())                                                                                     \
   X(int, fake_cuda_calls, (const char* function))                                                                     \
   /* Objects of all kinds that are not given back: memory, modules, streams, events, graphs, contexts. */             \
   X(int, fake_cuda_live, ())                                                                                          \

@@ -244,6 +244,12 @@ CONTROL int fake_cuda_calls(const char* function) {
   const auto found = Machine::get().calls.find(function);
   return found == Machine::get().calls.end() ? 0 : found->second;
 }
+CONTROL int fake_cuda_all_calls() {
+  const Lock lock(Machine::get().mutex);
+  int all = 0;
+  for (const auto& [function, count] : Machine::get().calls) all += count;
+  return all;
+}
 CONTROL int fake_cuda_live() {
   const Lock lock(Machine::get().mutex);
   return Machine::get().live();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -62,6 +63,8 @@ struct Queue {
 };
 
 struct EventState {
+  bool timed = false;
+  std::chrono::steady_clock::time_point when;
   std::shared_ptr<Queue> queue;
   std::uint64_t after = 0;
 };
