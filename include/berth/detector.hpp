@@ -12,6 +12,8 @@
 
 namespace berth {
 
+struct StageDifference;
+
 /// Room for the lists a frame produces; 0 picks the default for the image size (docs/capacities.md).
 struct Capacities {
   int run_ends = 0;
@@ -56,6 +58,7 @@ class Detector {
   std::size_t device_bytes() const;
 
  private:
+  friend std::optional<StageDifference> first_difference(Detector& first, Detector& second);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

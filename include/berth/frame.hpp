@@ -48,7 +48,7 @@ struct FrameResult {
   std::vector<Detection> detections;
   /// Quadrilaterals that were examined for a code.
   int quads = 0;
-  /// Run ends, contours and points of the whole image, then of the halved one.
+  /// Run ends, contours and points of each search in turn (docs/marker-pipeline.md).
   std::array<CapacityUse, 9> capacities = {};
   /// device: upload to download; decode; pose
   std::array<StageTime, 3> times = {};

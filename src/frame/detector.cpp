@@ -246,4 +246,10 @@ const FrameResult& Detector::detect(View2D<const u8> image, const FrameStamp& st
 }
 std::size_t Detector::device_bytes() const { return impl_->plan.device_bytes(); }
 
+std::optional<StageDifference> first_difference(Detector& first, Detector& second) {
+  StageReader a(first.impl_->plan, *first.impl_->stream);
+  StageReader b(second.impl_->plan, *second.impl_->stream);
+  return first_difference(a, b);
+}
+
 }  // namespace berth

@@ -55,4 +55,22 @@ const std::vector<u32>& StageReader::read(std::size_t index) {
   return words_;
 }
 
+std::optional<StageDifference> first_difference(StageReader& first, StageReader& second) {
+  const std::vector<Stage>& stages = first.plan().stages();
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const std::vector<u32>& a = first.read(i);
+    const std::vector<u32>& b = second.read(i);
+    if (a == b) continue;
+    const std::size_t shorter = std::min(a.size(), b.size());
+    const auto at = std::mismatch(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(shorter), b.begin());
+    StageDifference difference;
+    difference.stage = stages[i].name;
+    difference.word = static_cast<std::size_t>(at.first - a.begin());
+    if (at.first != a.end()) difference.first = *at.first;
+    if (at.second != b.end()) difference.second = *at.second;
+    return difference;
+  }
+  return std::nullopt;
+}
+
 }  // namespace berth

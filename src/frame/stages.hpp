@@ -1,7 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "berth/lockstep.hpp"
 #include "frame/marker_plan.hpp"
 
 namespace berth {
@@ -16,6 +18,8 @@ class StageReader {
   /// reduced to their flags.
   const std::vector<u32>& read(std::size_t index);
 
+  const MarkerPlan& plan() const { return plan_; }
+
  private:
   std::size_t fetch(Buffer& buffer, std::vector<u32>& words);
 
@@ -28,5 +32,10 @@ class StageReader {
   std::vector<Search> searches_;
   std::vector<u32> words_;
 };
+
+/// The first word that differs, stages in order of computation, between two plans of one geometry and configuration.
+std::optional<StageDifference> first_difference(StageReader& first, StageReader& second);
+/// The same of two detectors' last frames; both must be collected.
+std::optional<StageDifference> first_difference(Detector& first, Detector& second);
 
 }  // namespace berth

@@ -1,7 +1,7 @@
 #include "verify/verify.hpp"
 
 #include <chrono>
-#include <cstdio>
+#include <optional>
 
 #include "frame/marker_plan.hpp"
 #include "frame/stages.hpp"
@@ -36,21 +36,8 @@ std::string compare_frame(Backend& candidate, Backend& reference, const std::str
   FrameRun found(candidate, image, config);
   StageReader expected_reader = expected.reader();
   StageReader found_reader = found.reader();
-  for (std::size_t i = 0; i < expected.plan().stages().size(); ++i) {
-    const std::vector<u32>& wanted = expected_reader.read(i);
-    const std::vector<u32>& words = found_reader.read(i);
-    const std::string where = "frame " + name + ", stage " + expected.plan().stages()[i].name;
-    if (wanted.size() != words.size()) {
-      return where + ": " + std::to_string(words.size()) + " words, not " + std::to_string(wanted.size());
-    }
-    for (std::size_t k = 0; k < words.size(); ++k) {
-      if (words[k] == wanted[k]) continue;
-      char text[80];
-      std::snprintf(text, sizeof text, ": word %zu is 0x%08x, not 0x%08x", k, words[k], wanted[k]);
-      return where + text;
-    }
-  }
-  return "";
+  const std::optional<StageDifference> difference = first_difference(found_reader, expected_reader);
+  return difference ? "frame " + name + ", " + to_string(*difference) : "";
 }
 
 }  // namespace
