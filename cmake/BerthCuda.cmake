@@ -1,12 +1,9 @@
 # Who compiles the kernels for CUDA: nvcc makes a fatbin (machine code and PTX) for the devices it knows, Clang PTX 6.3
 # for sm_53 and later, which every driver since CUDA 10.2 compiles. Either will do; none of CUDA's headers is needed.
 #
-# Sets BERTH_NVCC and BERTH_CUDA_CLANG, empty where there is none that works, and BERTH_CUDA_DEFAULT, ON where there is
-# either.
+# Sets BERTH_NVCC and BERTH_CUDA_CLANG, false where there is none (OFF goes without), and BERTH_CUDA_DEFAULT, ON where
+# there is either.
 find_program(BERTH_NVCC nvcc PATHS /usr/local/cuda/bin DOC "Compiles the CUDA kernels to a fatbin")
-if(NOT BERTH_NVCC)
-  set(BERTH_NVCC "")
-endif()
 
 set(BERTH_CUDA_PTX_FLAGS -x cuda -std=c++14 -O3 -nocudainc -nocudalib --cuda-device-only --cuda-gpu-arch=sm_53
                          -Xclang -target-feature -Xclang +ptx63 -Wno-unknown-cuda-version)
@@ -24,8 +21,8 @@ function(berth_clang_makes_ptx out clang)
     endif()
   endif()
 endfunction()
-if(NOT BERTH_CUDA_CLANG)
-  set(found "")
+if(NOT DEFINED BERTH_CUDA_CLANG OR BERTH_CUDA_CLANG MATCHES "-NOTFOUND$")
+  set(found BERTH_CUDA_CLANG-NOTFOUND)
   foreach(name IN ITEMS clang-14 clang clang-18 clang-17 clang-16 clang-15 clang-13 clang-12 clang-11)
     find_program(candidate ${name})
     mark_as_advanced(candidate)
@@ -40,7 +37,13 @@ if(NOT BERTH_CUDA_CLANG)
       break()
     endif()
   endforeach()
-  set(BERTH_CUDA_CLANG "${found}" CACHE FILEPATH "Compiles the CUDA kernels to PTX" FORCE)
+  set(BERTH_CUDA_CLANG ${found} CACHE FILEPATH "Compiles the CUDA kernels to PTX" FORCE)
+elseif(BERTH_CUDA_CLANG)
+  berth_clang_makes_ptx(works ${BERTH_CUDA_CLANG})
+  if(NOT works)
+    message(FATAL_ERROR "BERTH_CUDA_CLANG=${BERTH_CUDA_CLANG} does not compile CUDA to PTX 6.3: name a Clang from 11 on, "
+                        "or pass -DBERTH_CUDA_CLANG=OFF")
+  endif()
 endif()
 
 if(BERTH_NVCC AND BERTH_CUDA_CLANG)
