@@ -41,7 +41,7 @@ if(NOT DEFINED BERTH_CUDA_CLANG OR BERTH_CUDA_CLANG MATCHES "-NOTFOUND$")
 elseif(BERTH_CUDA_CLANG)
   berth_clang_makes_ptx(works ${BERTH_CUDA_CLANG})
   if(NOT works)
-    message(FATAL_ERROR "BERTH_CUDA_CLANG=${BERTH_CUDA_CLANG} does not compile CUDA to PTX 6.3: name a Clang from 11 on, "
+    message(FATAL_ERROR "BERTH_CUDA_CLANG=${BERTH_CUDA_CLANG} does not compile CUDA to PTX 6.3: name one that does, "
                         "or pass -DBERTH_CUDA_CLANG=OFF")
   endif()
 endif()
