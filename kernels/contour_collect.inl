@@ -11,9 +11,9 @@ BODY
   EACH_ITEM
     ranks[LID] = GROUP < p.groups ? spans[GID] : 0u;
   EACH_END
-  EACH_ITEM
+  FIRST_ITEMS(1) {
     // Most groups begin no contour: nothing to number.
-    if (LID == 0 && GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
+    if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
       u32 rank = spans[p.totals_at + GROUP];
       u32 start = spans[p.totals_at + p.groups + 1 + GROUP];
       for (int i = 0; i < GROUP_SIZE; ++i) {
@@ -26,7 +26,8 @@ BODY
         }
       }
     }
-  EACH_END
+  }
+  BARRIER;
   EACH_ITEM
     const u32 needed = spans[p.totals_at + p.groups];
     if (GROUP < p.groups) {

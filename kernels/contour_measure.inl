@@ -15,24 +15,23 @@ SHARED(u32, contours, 1)
 SHARED(u32, points, 1)
 SHARED(int, node_count, 1)
 BODY
-  EACH_ITEM
-    if (LID == 0) {
-      contours[0] = 0u;
-      points[0] = 0u;
-      // Nodes exist for whole rows within the capacity: all of them, or the last row's begin that does not pass it.
-      int low = 0;
-      int high = p.height + 1;
-      while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        if (RUN_ENDS_BEFORE(middle * p.row_words) <= U32(p.capacity)) {
-          low = middle;
-        } else {
-          high = middle;
-        }
+  FIRST_ITEMS(1) {
+    contours[0] = 0u;
+    points[0] = 0u;
+    // Nodes exist for whole rows within the capacity: all of them, or the last row's begin that does not pass it.
+    int low = 0;
+    int high = p.height + 1;
+    while (high - low > 1) {
+      const int middle = (low + high) / 2;
+      if (RUN_ENDS_BEFORE(middle * p.row_words) <= U32(p.capacity)) {
+        low = middle;
+      } else {
+        high = middle;
       }
-      node_count[0] = S32(RUN_ENDS_BEFORE(low * p.row_words));
     }
-  EACH_END
+    node_count[0] = S32(RUN_ENDS_BEFORE(low * p.row_words));
+  }
+  BARRIER;
   EACH_ITEM
     const int first = GID * 2;
     u32 kept = 0u;
@@ -88,10 +87,9 @@ BODY
     }
     spans[GID] = kept;
   EACH_END
-  EACH_ITEM
-    if (LID == 0) {
-      spans[p.totals_at + GROUP] = contours[0];
-      spans[p.totals_at + p.groups + 1 + GROUP] = points[0];
-    }
-  EACH_END
+  FIRST_ITEMS(1) {
+    spans[p.totals_at + GROUP] = contours[0];
+    spans[p.totals_at + p.groups + 1 + GROUP] = points[0];
+  }
+  BARRIER;
 END

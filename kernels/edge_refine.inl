@@ -66,63 +66,62 @@ BODY
         }
       }
     EACH_END
-    EACH_ITEM
-      if (LID < 4) {
-        const int side = GROUP * QUAD_WORDS + QUAD_SIDE + LID * QUAD_SIDE_WORDS;
-        const int edge = GROUP * EDGE_WORDS + LID * EDGE_SIDE_WORDS;
-        const int u_from = quads[side + 3] * p.scale;
-        const int u_to = quads[side + 4] * p.scale;
-        const int halvings = side_halvings(max(u_from, u_to) - min(u_from, u_to));
-        const int u_ref = (quads[side] >> 1) * p.scale;
-        const int u_middle = (u_from + u_to) / 2;
-        int used = 0;
-        int residual = 0;
-        int slope = 0;
-        int mean_u = 0;
-        int value = 0;
-        for (int pass = 0; pass < 2; ++pass) {
-          int n = 0;
-          int sum_u = 0;
-          int sum_v = 0;
-          u32 sum_uu = 0u;
-          u32 sum_uv = 0u;
-          residual = 0;
-          for (int i = LID * 32; i < LID * 32 + 32; ++i) {
-            if (along[i] != EDGE_NOT_SEEN) {
-              const int u = along[i] >> halvings;
-              const int miss = pass == 0 ? 0 : offset[i] - value - ((slope * (u - mean_u)) >> 8);
-              if (miss <= 192 && miss >= -192) {
-                n += 1;
-                sum_u += u;
-                sum_v += offset[i];
-                sum_uu += U32(u * u);
-                sum_uv += U32(u * offset[i]);
-                residual += miss < 0 ? -miss : miss;
-              }
+    FIRST_ITEMS(4) {
+      const int side = GROUP * QUAD_WORDS + QUAD_SIDE + LID * QUAD_SIDE_WORDS;
+      const int edge = GROUP * EDGE_WORDS + LID * EDGE_SIDE_WORDS;
+      const int u_from = quads[side + 3] * p.scale;
+      const int u_to = quads[side + 4] * p.scale;
+      const int halvings = side_halvings(max(u_from, u_to) - min(u_from, u_to));
+      const int u_ref = (quads[side] >> 1) * p.scale;
+      const int u_middle = (u_from + u_to) / 2;
+      int used = 0;
+      int residual = 0;
+      int slope = 0;
+      int mean_u = 0;
+      int value = 0;
+      for (int pass = 0; pass < 2; ++pass) {
+        int n = 0;
+        int sum_u = 0;
+        int sum_v = 0;
+        u32 sum_uu = 0u;
+        u32 sum_uv = 0u;
+        residual = 0;
+        for (int i = LID * 32; i < LID * 32 + 32; ++i) {
+          if (along[i] != EDGE_NOT_SEEN) {
+            const int u = along[i] >> halvings;
+            const int miss = pass == 0 ? 0 : offset[i] - value - ((slope * (u - mean_u)) >> 8);
+            if (miss <= 192 && miss >= -192) {
+              n += 1;
+              sum_u += u;
+              sum_v += offset[i];
+              sum_uu += U32(u * u);
+              sum_uv += U32(u * offset[i]);
+              residual += miss < 0 ? -miss : miss;
             }
           }
-          const int spread = n < 3 ? 0 : line_moment(n, sum_u, sum_u, sum_uu);
-          if (spread > 0) {
-            used = n;
-            slope = ratio(line_moment(n, sum_u, sum_v, sum_uv), spread, 8, 64);
-            mean_u = line_mean(n, sum_u);
-            value = (line_value_q8(n, sum_u, sum_v, slope, 8) + 128) >> 8;
-            residual = residual / n;
-          } else {
-            used = 0;
-          }
         }
-        // Offsets are q9 px over half pixels (halved `halvings` times), their slope q8: q16 of half pixels over half
-        // pixels, against q14 for the side's.
-        const int tilt = used == 0 ? 0 : divide_rounded(slope, 4 * (1 << halvings));
-        const int from_mean = ((u_ref - u_middle) >> halvings) - mean_u;
-        const int at_ref = used == 0 ? 0 : divide_rounded(slope * max(-2048, min(2048, from_mean)), 256);
-        edges[edge] = quads[side + 1] * p.scale + (used == 0 ? 0 : value + at_ref);
-        edges[edge + 1] = quads[side + 2] + tilt;
-        edges[edge + 2] = used;
-        edges[edge + 3] = residual;
+        const int spread = n < 3 ? 0 : line_moment(n, sum_u, sum_u, sum_uu);
+        if (spread > 0) {
+          used = n;
+          slope = ratio(line_moment(n, sum_u, sum_v, sum_uv), spread, 8, 64);
+          mean_u = line_mean(n, sum_u);
+          value = (line_value_q8(n, sum_u, sum_v, slope, 8) + 128) >> 8;
+          residual = residual / n;
+        } else {
+          used = 0;
+        }
       }
-    EACH_END
+      // Offsets are q9 px over half pixels (halved `halvings` times), their slope q8: q16 of half pixels over half
+      // pixels, against q14 for the side's.
+      const int tilt = used == 0 ? 0 : divide_rounded(slope, 4 * (1 << halvings));
+      const int from_mean = ((u_ref - u_middle) >> halvings) - mean_u;
+      const int at_ref = used == 0 ? 0 : divide_rounded(slope * max(-2048, min(2048, from_mean)), 256);
+      edges[edge] = quads[side + 1] * p.scale + (used == 0 ? 0 : value + at_ref);
+      edges[edge + 1] = quads[side + 2] + tilt;
+      edges[edge + 2] = used;
+      edges[edge + 3] = residual;
+    }
+    BARRIER;
   }
 END
 

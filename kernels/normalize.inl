@@ -16,32 +16,30 @@ BODY
       counts[bin] = sum;
     }
   EACH_END
-  EACH_ITEM
-    if (LID < 3) {
-      const int permille = LID == 0 ? p.black_permille : LID == 1 ? p.white_permille : p.noise_permille;
-      u32 count = 0u;
-      for (int bin = 0; bin < 256; ++bin) count += counts[LID * 256 + bin];
-      u32 level = 255u;
-      u32 below = 0u;
-      for (int bin = 0; bin < 256; ++bin) {
-        below += counts[LID * 256 + bin];
-        if (level == 255u && below * 1000u > count * U32(permille)) level = U32(bin);
-      }
-      quantiles[LID] = level;
+  FIRST_ITEMS(3) {
+    const int permille = LID == 0 ? p.black_permille : LID == 1 ? p.white_permille : p.noise_permille;
+    u32 count = 0u;
+    for (int bin = 0; bin < 256; ++bin) count += counts[LID * 256 + bin];
+    u32 level = 255u;
+    u32 below = 0u;
+    for (int bin = 0; bin < 256; ++bin) {
+      below += counts[LID * 256 + bin];
+      if (level == 255u && below * 1000u > count * U32(permille)) level = U32(bin);
     }
-  EACH_END
-  EACH_ITEM
-    if (LID == 0) {
-      const u32 black = quantiles[0];
-      const u32 white = quantiles[1];
-      const u32 noise = quantiles[2];
-      const u32 range = white > black ? white - black : 0u;
-      const u32 by_range = (range * U32(p.contrast_permille) + 500u) / 1000u;
-      const u32 by_noise = (noise * U32(p.noise_gain_q4) + 8u) >> 4;
-      levels[0] = black;
-      levels[1] = white;
-      levels[2] = noise;
-      levels[3] = min(max(max(by_range, by_noise), U32(p.min_contrast)), U32(p.max_contrast));
-    }
-  EACH_END
+    quantiles[LID] = level;
+  }
+  BARRIER;
+  FIRST_ITEMS(1) {
+    const u32 black = quantiles[0];
+    const u32 white = quantiles[1];
+    const u32 noise = quantiles[2];
+    const u32 range = white > black ? white - black : 0u;
+    const u32 by_range = (range * U32(p.contrast_permille) + 500u) / 1000u;
+    const u32 by_noise = (noise * U32(p.noise_gain_q4) + 8u) >> 4;
+    levels[0] = black;
+    levels[1] = white;
+    levels[2] = noise;
+    levels[3] = min(max(max(by_range, by_noise), U32(p.min_contrast)), U32(p.max_contrast));
+  }
+  BARRIER;
 END

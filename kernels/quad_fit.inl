@@ -88,32 +88,29 @@ BODY
       work[384 + LID] = bottom;
       work[512 + LID] = area;
     EACH_END
-    EACH_ITEM
-      if (LID < 80) {
-        const int first = (LID >> 4) * 128 + (LID & 15);
-        int all = work[first];
-        for (int i = first + 16; i < first + 128; i += 16) all = LID < 64 ? max(all, work[i]) : all + work[i];
-        work[first] = all;
-      }
-    EACH_END
-    EACH_ITEM
-      if (LID < 5) {
-        int all = work[LID * 128];
-        for (int i = LID * 128 + 1; i < LID * 128 + 16; ++i) all = LID < 4 ? max(all, work[i]) : all + work[i];
-        state[BOX + LID] = all;
-      }
-    EACH_END
-    EACH_ITEM
-      if (LID == 0) {
-        state[FIRST] = 0;
-        state[LAST] = count;
-        state[FROM_X] = (X_MIN + X_MAX) / 2;
-        state[FROM_Y] = (Y_MIN + Y_MAX) / 2;
-        state[SEARCH] = FROM_CENTRE;
-        state[DONE] = 0;
-        state[GOOD] = 0;
-      }
-    EACH_END
+    FIRST_ITEMS(80) {
+      const int first = (LID >> 4) * 128 + (LID & 15);
+      int all = work[first];
+      for (int i = first + 16; i < first + 128; i += 16) all = LID < 64 ? max(all, work[i]) : all + work[i];
+      work[first] = all;
+    }
+    BARRIER;
+    FIRST_ITEMS(5) {
+      int all = work[LID * 128];
+      for (int i = LID * 128 + 1; i < LID * 128 + 16; ++i) all = LID < 4 ? max(all, work[i]) : all + work[i];
+      state[BOX + LID] = all;
+    }
+    BARRIER;
+    FIRST_ITEMS(1) {
+      state[FIRST] = 0;
+      state[LAST] = count;
+      state[FROM_X] = (X_MIN + X_MAX) / 2;
+      state[FROM_Y] = (Y_MIN + Y_MAX) / 2;
+      state[SEARCH] = FROM_CENTRE;
+      state[DONE] = 0;
+      state[GOOD] = 0;
+    }
+    BARRIER;
     // One search a turn: every item its share, sixteen items eight results each, one item the rest; that one draws the
     // conclusions and says what to search next. Compilers that unroll barriers get a single copy of it.
     while (state[DONE] == 0) {
@@ -136,9 +133,9 @@ BODY
           work[128 + LID] = at;
         }
       EACH_END
-      EACH_ITEM
+      FIRST_ITEMS(16) {
         const int busy = min(state[LAST] - state[FIRST], GROUP_SIZE);
-        if (LID < 16 && LID + 16 < busy) {
+        if (LID + 16 < busy) {
           u32 most = U32(work[LID]);
           int at = work[128 + LID];
           for (int i = LID + 16; i < busy; i += 16) {
@@ -151,117 +148,117 @@ BODY
           work[LID] = S32(most);
           work[128 + LID] = at;
         }
-      EACH_END
-      EACH_ITEM
-        if (LID == 0) {
-          const int search = state[SEARCH];
-          const int rest = min(state[LAST] - state[FIRST], 16);
-          u32 most = 0u;
-          int at = -1;  // the first of the farthest points, -1 when all distances are 0
-          for (int i = 0; i < rest; ++i) {
-            const u32 far = U32(work[i]);
-            if (far > most || (far == most && work[128 + i] < at)) {
-              most = far;
-              at = work[128 + i];
-            }
-          }
-          if (search == FROM_CENTRE) {
-            state[VERTEX] = max(at, 0);
-          } else if (search == FROM_FIRST) {
-            const int first = state[VERTEX];
-            const int other = max(at, 0);
-            state[VERTEX] = min(first, other);
-            state[VERTEX + 1] = max(first, other);
-            state[VERTEX + 2] = min(first, other) + count;
-            state[VERTICES] = 2;
-            if (first == other) state[DONE] = 1;
-          } else if (search >= SPLITS && search < POLISHED) {
-            if (at >= 0) state[VERTEX + (search & 3)] = at % count;
-          } else {
-            const int k = search < 4 ? search - 2 : search < SPLITS ? state[SPLIT] + (search & 1) : search - POLISHED;
-            const u32 length = square_root(square_distance(state[CHORD_X], state[CHORD_Y]));
-            state[FAR + k] = at;
-            state[HEIGHT + k] = S32(arc_height_q4(most, length));
-          }
-          if (search == 3 || search == 5) {  // split the arc with the greatest height
-            int split = 0;
-            for (int k = 1; k < state[VERTICES]; ++k) {
-              if (state[HEIGHT + k] > state[HEIGHT + split]) split = k;
-            }
-            if (state[FAR + split] < 0) {
-              state[DONE] = 1;
-            } else {
-              for (int k = state[VERTICES]; k > split; --k) state[VERTEX + k + 1] = state[VERTEX + k];
-              for (int k = state[VERTICES] - 1; k > split; --k) {
-                state[FAR + k + 1] = state[FAR + k];
-                state[HEIGHT + k + 1] = state[HEIGHT + k];
-              }
-              state[VERTEX + split + 1] = state[FAR + split];
-              state[VERTICES] = state[VERTICES] + 1;
-              state[SPLIT] = split;
-            }
-          } else if (search == POLISHED - 1) {  // back into the first turn's order: rotate until the smallest leads
-            for (int k = 0; k < 3; ++k) {
-              if (state[VERTEX] > state[VERTEX + 1] || state[VERTEX] > state[VERTEX + 2] ||
-                  state[VERTEX] > state[VERTEX + 3]) {
-                const int lead = state[VERTEX];
-                state[VERTEX] = state[VERTEX + 1];
-                state[VERTEX + 1] = state[VERTEX + 2];
-                state[VERTEX + 2] = state[VERTEX + 3];
-                state[VERTEX + 3] = lead;
-              }
-            }
-            state[VERTEX + 4] = state[VERTEX] + count;
-            for (int k = 0; k < 4; ++k) {
-              if (state[VERTEX + k] >= state[VERTEX + k + 1]) state[DONE] = 1;
-            }
-          } else if (search == SPLITS - 1 || search == SEARCHES - 1) {
-            int good = 1;
-            int polygon = 0;  // twice the area in half pixels squared
-            int shortest = 0x7fffffff;
-            const int x0 = POINT_X(state[VERTEX]);
-            const int y0 = POINT_Y(state[VERTEX]);
-            for (int k = 0; k < 4; ++k) {
-              const int ax = POINT_X(state[VERTEX + k]) - x0;
-              const int ay = POINT_Y(state[VERTEX + k]) - y0;
-              const int bx = POINT_X(state[VERTEX + k + 1]) - x0;
-              const int by = POINT_Y(state[VERTEX + k + 1]) - y0;
-              polygon += ax * by - bx * ay;
-              const int length = S32(square_root(square_distance(bx - ax, by - ay)));
-              shortest = min(shortest, length);
-              if (length < p.min_side_px * 2 || state[HEIGHT + k] > 51 + length * 4 / 5) good = 0;
-            }
-            const int contour = AREA * turn * 8;
-            const int off = polygon * turn > contour ? polygon * turn - contour : contour - polygon * turn;
-            if (polygon * turn <= 0 || off > contour / 10 * 3 + (X_MAX - X_MIN) * 8) good = 0;
-            state[GOOD] = good;
-            state[DONE] = search == SEARCHES - 1 ? 1 : good;
-            state[SHORTEST] = shortest;
-          }
-          state[SEARCH] = search + 1;
-          if (search == FROM_CENTRE) {
-            state[FROM_X] = POINT_X(state[VERTEX]);
-            state[FROM_Y] = POINT_Y(state[VERTEX]);
-          } else if (state[DONE] == 0) {
-            const int next = search + 1;
-            int k = next < 4 ? next - 2 : next < SPLITS ? state[SPLIT] + (next & 1) : next & 3;
-            int from = state[VERTEX + k];
-            int to = state[VERTEX + k + 1];
-            if (next >= SPLITS && next < POLISHED) {
-              // From the vertex before to the vertex after, beginning in the first turn.
-              from = state[VERTEX + ((k + 3) & 3)];
-              to = state[VERTEX + ((k + 1) & 3)];
-              if (to <= from) to += count;
-            }
-            state[FIRST] = from + 1;
-            state[LAST] = to;
-            state[FROM_X] = POINT_X(from);
-            state[FROM_Y] = POINT_Y(from);
-            state[CHORD_X] = POINT_X(to) - state[FROM_X];
-            state[CHORD_Y] = POINT_Y(to) - state[FROM_Y];
+      }
+      BARRIER;
+      FIRST_ITEMS(1) {
+        const int search = state[SEARCH];
+        const int rest = min(state[LAST] - state[FIRST], 16);
+        u32 most = 0u;
+        int at = -1;  // the first of the farthest points, -1 when all distances are 0
+        for (int i = 0; i < rest; ++i) {
+          const u32 far = U32(work[i]);
+          if (far > most || (far == most && work[128 + i] < at)) {
+            most = far;
+            at = work[128 + i];
           }
         }
-      EACH_END
+        if (search == FROM_CENTRE) {
+          state[VERTEX] = max(at, 0);
+        } else if (search == FROM_FIRST) {
+          const int first = state[VERTEX];
+          const int other = max(at, 0);
+          state[VERTEX] = min(first, other);
+          state[VERTEX + 1] = max(first, other);
+          state[VERTEX + 2] = min(first, other) + count;
+          state[VERTICES] = 2;
+          if (first == other) state[DONE] = 1;
+        } else if (search >= SPLITS && search < POLISHED) {
+          if (at >= 0) state[VERTEX + (search & 3)] = at % count;
+        } else {
+          const int k = search < 4 ? search - 2 : search < SPLITS ? state[SPLIT] + (search & 1) : search - POLISHED;
+          const u32 length = square_root(square_distance(state[CHORD_X], state[CHORD_Y]));
+          state[FAR + k] = at;
+          state[HEIGHT + k] = S32(arc_height_q4(most, length));
+        }
+        if (search == 3 || search == 5) {  // split the arc with the greatest height
+          int split = 0;
+          for (int k = 1; k < state[VERTICES]; ++k) {
+            if (state[HEIGHT + k] > state[HEIGHT + split]) split = k;
+          }
+          if (state[FAR + split] < 0) {
+            state[DONE] = 1;
+          } else {
+            for (int k = state[VERTICES]; k > split; --k) state[VERTEX + k + 1] = state[VERTEX + k];
+            for (int k = state[VERTICES] - 1; k > split; --k) {
+              state[FAR + k + 1] = state[FAR + k];
+              state[HEIGHT + k + 1] = state[HEIGHT + k];
+            }
+            state[VERTEX + split + 1] = state[FAR + split];
+            state[VERTICES] = state[VERTICES] + 1;
+            state[SPLIT] = split;
+          }
+        } else if (search == POLISHED - 1) {  // back into the first turn's order: rotate until the smallest leads
+          for (int k = 0; k < 3; ++k) {
+            if (state[VERTEX] > state[VERTEX + 1] || state[VERTEX] > state[VERTEX + 2] ||
+                state[VERTEX] > state[VERTEX + 3]) {
+              const int lead = state[VERTEX];
+              state[VERTEX] = state[VERTEX + 1];
+              state[VERTEX + 1] = state[VERTEX + 2];
+              state[VERTEX + 2] = state[VERTEX + 3];
+              state[VERTEX + 3] = lead;
+            }
+          }
+          state[VERTEX + 4] = state[VERTEX] + count;
+          for (int k = 0; k < 4; ++k) {
+            if (state[VERTEX + k] >= state[VERTEX + k + 1]) state[DONE] = 1;
+          }
+        } else if (search == SPLITS - 1 || search == SEARCHES - 1) {
+          int good = 1;
+          int polygon = 0;  // twice the area in half pixels squared
+          int shortest = 0x7fffffff;
+          const int x0 = POINT_X(state[VERTEX]);
+          const int y0 = POINT_Y(state[VERTEX]);
+          for (int k = 0; k < 4; ++k) {
+            const int ax = POINT_X(state[VERTEX + k]) - x0;
+            const int ay = POINT_Y(state[VERTEX + k]) - y0;
+            const int bx = POINT_X(state[VERTEX + k + 1]) - x0;
+            const int by = POINT_Y(state[VERTEX + k + 1]) - y0;
+            polygon += ax * by - bx * ay;
+            const int length = S32(square_root(square_distance(bx - ax, by - ay)));
+            shortest = min(shortest, length);
+            if (length < p.min_side_px * 2 || state[HEIGHT + k] > 51 + length * 4 / 5) good = 0;
+          }
+          const int contour = AREA * turn * 8;
+          const int off = polygon * turn > contour ? polygon * turn - contour : contour - polygon * turn;
+          if (polygon * turn <= 0 || off > contour / 10 * 3 + (X_MAX - X_MIN) * 8) good = 0;
+          state[GOOD] = good;
+          state[DONE] = search == SEARCHES - 1 ? 1 : good;
+          state[SHORTEST] = shortest;
+        }
+        state[SEARCH] = search + 1;
+        if (search == FROM_CENTRE) {
+          state[FROM_X] = POINT_X(state[VERTEX]);
+          state[FROM_Y] = POINT_Y(state[VERTEX]);
+        } else if (state[DONE] == 0) {
+          const int next = search + 1;
+          int k = next < 4 ? next - 2 : next < SPLITS ? state[SPLIT] + (next & 1) : next & 3;
+          int from = state[VERTEX + k];
+          int to = state[VERTEX + k + 1];
+          if (next >= SPLITS && next < POLISHED) {
+            // From the vertex before to the vertex after, beginning in the first turn.
+            from = state[VERTEX + ((k + 3) & 3)];
+            to = state[VERTEX + ((k + 1) & 3)];
+            if (to <= from) to += count;
+          }
+          state[FIRST] = from + 1;
+          state[LAST] = to;
+          state[FROM_X] = POINT_X(from);
+          state[FROM_Y] = POINT_Y(from);
+          state[CHORD_X] = POINT_X(to) - state[FROM_X];
+          state[CHORD_Y] = POINT_Y(to) - state[FROM_Y];
+        }
+      }
+      BARRIER;
     }
     if (state[GOOD] != 0) {
       // The side's line: u along its dominant axis, v across, both about the middle of the side and halved until they
@@ -326,27 +323,25 @@ BODY
         work[384 + LID] = S32(sum_uu);
         work[512 + LID] = S32(sum_uv);
       EACH_END
-      EACH_ITEM
-        if (LID < 20) {
-          const int first = LID % 5 * 128 + LID / 5 * 32;
-          u32 sum = 0u;
-          for (int i = first; i < first + 32; ++i) sum += U32(work[i]);
-          sums[LID] = S32(sum);
-        }
-      EACH_END
-      EACH_ITEM
-        if (LID == 0) {
-          for (int k = 0; k < 4; ++k) {
-            const int n = sums[k * 5];
-            if (n < 3) {
-              state[GOOD] = 0;
-            } else if (line_moment(n, sums[k * 5 + 1], sums[k * 5 + 1], U32(sums[k * 5 + 3])) <= 0) {
-              state[GOOD] = 0;
-            }
+      FIRST_ITEMS(20) {
+        const int first = LID % 5 * 128 + LID / 5 * 32;
+        u32 sum = 0u;
+        for (int i = first; i < first + 32; ++i) sum += U32(work[i]);
+        sums[LID] = S32(sum);
+      }
+      BARRIER;
+      FIRST_ITEMS(1) {
+        for (int k = 0; k < 4; ++k) {
+          const int n = sums[k * 5];
+          if (n < 3) {
+            state[GOOD] = 0;
+          } else if (line_moment(n, sums[k * 5 + 1], sums[k * 5 + 1], U32(sums[k * 5 + 3])) <= 0) {
+            state[GOOD] = 0;
           }
         }
-      EACH_END
-      EACH_ITEM
+      }
+      BARRIER;
+      FIRST_ITEMS(5) {
         if (LID < 4 && state[GOOD] != 0) {
           const int i0 = state[VERTEX + LID];
           const int i1 = state[VERTEX + LID + 1];
@@ -374,15 +369,16 @@ BODY
           quads[quad + 2] = AREA * turn;
           quads[quad + 3] = state[SHORTEST];
         }
-      EACH_END
+      }
+      BARRIER;
     }
-    EACH_ITEM
-      if (LID == 0) quads[quad] = state[GOOD] != 0 ? (turn < 0 ? QUAD_VALID | QUAD_HOLE : QUAD_VALID) : 0;
-    EACH_END
+    FIRST_ITEMS(1) { quads[quad] = state[GOOD] != 0 ? (turn < 0 ? QUAD_VALID | QUAD_HOLE : QUAD_VALID) : 0; }
+    BARRIER;
   } else {
-    EACH_ITEM
-      if (LID == 0 && GROUP < p.max_contours) quads[quad] = 0;
-    EACH_END
+    FIRST_ITEMS(1) {
+      if (GROUP < p.max_contours) quads[quad] = 0;
+    }
+    BARRIER;
   }
 END
 

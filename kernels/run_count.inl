@@ -16,17 +16,16 @@ BODY
     }
     sums[LID] = count;
   EACH_END
-  EACH_ITEM  // 128 numbers: the group's first item adds them up faster than seven barriers would
-    if (LID == 0) {
-      u32 before = 0u;
-      for (int i = 0; i < GROUP_SIZE; ++i) {
-        const u32 count = sums[i];
-        sums[i] = before;
-        before += count;
-      }
-      offsets[p.base_at + GROUP] = before;
+  FIRST_ITEMS(1) {  // 128 numbers: the group's first item adds them up faster than seven barriers would
+    u32 before = 0u;
+    for (int i = 0; i < GROUP_SIZE; ++i) {
+      const u32 count = sums[i];
+      sums[i] = before;
+      before += count;
     }
-  EACH_END
+    offsets[p.base_at + GROUP] = before;
+  }
+  BARRIER;
   EACH_ITEM
     offsets[GID] = sums[LID];
   EACH_END

@@ -11,17 +11,16 @@ BODY
     for (int i = LID * share; i < end; ++i) sum += values[p.first + i];
     sums[LID] = sum;
   EACH_END
-  EACH_ITEM
-    if (LID == 0) {
-      u32 before = 0u;
-      for (int i = 0; i < GROUP_SIZE; ++i) {
-        const u32 sum = sums[i];
-        sums[i] = before;
-        before += sum;
-      }
-      values[p.first + p.count] = before;
+  FIRST_ITEMS(1) {
+    u32 before = 0u;
+    for (int i = 0; i < GROUP_SIZE; ++i) {
+      const u32 sum = sums[i];
+      sums[i] = before;
+      before += sum;
     }
-  EACH_END
+    values[p.first + p.count] = before;
+  }
+  BARRIER;
   EACH_ITEM
     const int share = (p.count + GROUP_SIZE - 1) / GROUP_SIZE;
     const int end = min((LID + 1) * share, p.count);

@@ -1,24 +1,35 @@
 # The kernel text as SPIR-V, for Vulkan.
 #
 # berth_embed_spirv(OUT): sets OUT to a generated source that defines spirv_kernel() of spirv_kernels.hpp. Each
-# operation of ops.h becomes a shader of its own, compiled by glslangValidator and checked by spirv-val.
+# operation of ops.h becomes a shader of its own, and another for processors where its items share memory (see
+# prelude/glsl.h), compiled by glslangValidator and checked by spirv-val.
 #
-# Run as a script (cmake -DMODULES=a.spv;b.spv -DOUT=… -P spirv.cmake) it writes that source.
+# Run as a script (cmake -DMODULES=a.spv;b.spv;b.lanes.spv -DLANES=8 -DOUT=… -P spirv.cmake) it writes that source.
 if(CMAKE_SCRIPT_MODE_FILE)
   set(source "// Generated from kernels/ by kernels/spirv.cmake.\n#include \"spirv_kernels.hpp\"\n\nnamespace berth {\n")
   string(APPEND source "namespace {\n\n")
-  set(table "")
+  set(ops "")
   foreach(module IN LISTS MODULES)
     get_filename_component(op ${module} NAME_WE)
     file(READ ${module} bytes HEX)
     string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1u," words "${bytes}")
-    string(APPEND source "const u32 ${op}[] = {${words}};\n")
-    string(APPEND table "  case Op::${op}: {\n    static const SpirvKernel kernel = {${op}, sizeof ${op}};\n"
-                        "    return kernel;\n  }\n")
+    if(module MATCHES "\\.lanes\\.spv$")
+      string(APPEND source "const u32 ${op}_lanes[] = {${words}};\n")
+      set(lanes_of_${op} "{${op}_lanes, sizeof ${op}_lanes, ${LANES}}")
+    else()
+      string(APPEND source "const u32 ${op}[] = {${words}};\n")
+      set(lanes_of_${op} "{${op}, sizeof ${op}, 1}")
+      list(APPEND ops ${op})
+    endif()
   endforeach()
-  string(APPEND source "const SpirvKernel none = {nullptr, 0};\n\n}  // namespace\n\n"
-                       "const SpirvKernel& spirv_kernel(Op op) {\n  switch (op) {\n${table}  }\n  return none;\n}\n\n"
-                       "}  // namespace berth\n")
+  set(table "")
+  foreach(op IN LISTS ops)
+    string(APPEND table "  case Op::${op}: {\n    static const SpirvKernel kernels[] = {{${op}, sizeof ${op}, 1}, "
+                        "${lanes_of_${op}}};\n    return kernels[for_processor ? 1 : 0];\n  }\n")
+  endforeach()
+  string(APPEND source "const SpirvKernel none = {nullptr, 0, 0};\n\n}  // namespace\n\n"
+                       "const SpirvKernel& spirv_kernel(Op op, bool for_processor) {\n  switch (op) {\n${table}  }\n"
+                       "  return none;\n}\n\n}  // namespace berth\n")
   file(WRITE ${OUT} "${source}")
   return()
 endif()
@@ -31,6 +42,7 @@ function(berth_embed_spirv out)
     message(FATAL_ERROR "The Vulkan backend needs glslangValidator and spirv-val: apt install glslang-tools spirv-tools, "
                         "or pass -DBERTH_WITH_VULKAN=OFF")
   endif()
+  set(lanes 8)  # 32-bit lanes of an AVX2 register
   file(READ ${BERTH_KERNELS_DIR}/ops.h declarations)
   string(REGEX MATCHALL "X\\([a-z0-9_]+\\)" ops "${declarations}")
   file(GLOB texts CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/*.h ${BERTH_KERNELS_DIR}/*.inl)
@@ -49,19 +61,33 @@ function(berth_embed_spirv out)
 #include \"runs.h\"
 #include \"@op@.inl\"
 ")
-    add_custom_command(
-      OUTPUT ${folder}/${op}.spv
-      COMMAND ${BERTH_GLSLANG} -V --quiet --target-env vulkan1.1 -g0 -I${BERTH_KERNELS_DIR} -o ${folder}/${op}.spv
-              ${folder}/${op}.comp
-      COMMAND ${BERTH_SPIRV_VAL} --target-env vulkan1.1 ${folder}/${op}.spv
-      DEPENDS ${texts} ${folder}/${op}.comp
-      COMMENT "Compiling ${op} to SPIR-V" VERBATIM)
-    list(APPEND modules ${folder}/${op}.spv)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/${op}.inl)
+    file(STRINGS ${BERTH_KERNELS_DIR}/${op}.inl shared REGEX "^SHARED\\(")
+    set(variants ${op}.lanes ${op})
+    if(NOT shared)
+      set(variants ${op})
+    endif()
+    foreach(variant IN LISTS variants)
+      set(definition "")
+      if(variant MATCHES "lanes$")
+        set(definition -DBERTH_LANE_GROUPS=${lanes})
+      elseif(NOT shared)
+        set(definition -DBERTH_NO_SHARED)
+      endif()
+      add_custom_command(
+        OUTPUT ${folder}/${variant}.spv
+        COMMAND ${BERTH_GLSLANG} -V --quiet --target-env vulkan1.1 -g0 ${definition} -I${BERTH_KERNELS_DIR}
+                -o ${folder}/${variant}.spv ${folder}/${op}.comp
+        COMMAND ${BERTH_SPIRV_VAL} --target-env vulkan1.1 ${folder}/${variant}.spv
+        DEPENDS ${texts} ${folder}/${op}.comp
+        COMMENT "Compiling ${variant} to SPIR-V" VERBATIM)
+      list(INSERT modules 0 ${folder}/${variant}.spv)
+    endforeach()
   endforeach()
   set(source ${CMAKE_CURRENT_BINARY_DIR}/spirv_kernels.cpp)
   add_custom_command(
     OUTPUT ${source}
-    COMMAND ${CMAKE_COMMAND} "-DMODULES=${modules}" -DOUT=${source} -P ${BERTH_SPIRV_SCRIPT}
+    COMMAND ${CMAKE_COMMAND} "-DMODULES=${modules}" -DLANES=${lanes} -DOUT=${source} -P ${BERTH_SPIRV_SCRIPT}
     DEPENDS ${modules} ${BERTH_SPIRV_SCRIPT}
     COMMENT "Embedding the SPIR-V kernels" VERBATIM)
   set(${out} ${source} PARENT_SCOPE)

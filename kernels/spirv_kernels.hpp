@@ -7,12 +7,16 @@
 namespace berth {
 
 /// One operation as a SPIR-V 1.3 module with the entry point `main`: buffer i is binding i of set 0, the parameters are
-/// push constants, a work-group has kGroupSize items. Compiled and validated when the program was built.
+/// push constants. Compiled and validated when the program was built.
 struct SpirvKernel {
   const u32* words;
   std::size_t bytes;
+  /// Groups of kGroupSize items that a Vulkan work-group runs: one, with an invocation an item; or several, with an
+  /// invocation a group, and the number of groups follows the parameters as one more int.
+  int groups;
 };
 
-const SpirvKernel& spirv_kernel(Op op);
+/// The kernel for GPUs, or the one for processors. They are the same where items share nothing.
+const SpirvKernel& spirv_kernel(Op op, bool for_processor);
 
 }  // namespace berth

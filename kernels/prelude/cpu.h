@@ -13,6 +13,8 @@
 #define END }
 #define EACH_ITEM for (int lid_ = 0; lid_ < GROUP_SIZE; ++lid_) {
 #define EACH_END }
+#define FIRST_ITEMS(n) for (int lid_ = 0; lid_ < (n); ++lid_)
+#define BARRIER
 #define LID lid_
 #define GROUP group_
 #define GID (group_ * GROUP_SIZE + lid_)

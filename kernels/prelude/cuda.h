@@ -39,9 +39,11 @@ static inline __device__ void atomicMin(u32* x, u32 v) { __nvvm_atom_min_gen_ui(
 #define BODY
 #define END }
 #define EACH_ITEM {
+#define BARRIER __syncthreads()
 #define EACH_END \
   }              \
-  __syncthreads();
+  BARRIER;
+#define FIRST_ITEMS(n) if (LID < (n))
 #define GID (GROUP * GROUP_SIZE + LID)
 
 // On shared memory only.

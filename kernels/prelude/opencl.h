@@ -14,9 +14,11 @@ typedef int s32;
 #define BODY
 #define END }
 #define EACH_ITEM {
+#define BARRIER barrier(CLK_LOCAL_MEM_FENCE)
 #define EACH_END \
   }              \
-  barrier(CLK_LOCAL_MEM_FENCE);
+  BARRIER;
+#define FIRST_ITEMS(n) if (LID < (n))
 #define LID ((int)get_local_id(0))
 #define GROUP ((int)get_group_id(0))
 #define GID ((int)get_global_id(0))
