@@ -66,7 +66,7 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
     options->stream.svg = (out / "trajectory.svg").string();
     options->stream.picture = (out / "markers.png").string();
     console.out() << "scenario    " << scenario << '\n';
-    exit_code = run_stream(*source, options->stream, console) > 0 ? kOk : kNoResult;
+    exit_code = run_stream(*source, options->stream, console).with_markers > 0 ? kOk : kNoResult;
   });
 }
 

@@ -145,7 +145,7 @@ void run_detect(const DetectOptions& options, Console& console) {
   }
   const std::vector<std::string> paths = expand(options, console);
   DrawTarget draw(options.draw, paths.size());
-  Engine engine(open_chosen_backend(options.engine), std::move(config));
+  Engine engine(open_chosen_backends(options.engine), std::move(config));
   for (const std::string& path : paths) {
     try {
       detect_one(path, options, engine, draw, console);

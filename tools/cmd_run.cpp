@@ -13,6 +13,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
   berth run --source dir:recording/ --json - | jq .detections
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
+  berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
 
 Ctrl-C ends the stream cleanly, with its summary.)";
 
@@ -38,11 +39,11 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("N")
       ->capture_default_str();
   add_engine_options(*command, options->stream.engine);
+  add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
     const std::unique_ptr<Source> source = open_source(options->source);
-    run_stream(*source, options->stream, console);
-    exit_code = kOk;
+    exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;
   });
 }
 

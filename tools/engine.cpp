@@ -34,7 +34,7 @@ std::string joined(const std::vector<std::string>& words) {
 }  // namespace
 
 void add_backend_options(CLI::App& command, EngineOptions& options) {
-  command.add_option("--backend", options.backend, "simd, cpu, opencl or reference; default: the first that opens")
+  command.add_option("--backend", options.backend, joined(backend_names()) + "; default: the first that opens")
       ->type_name("NAME");
   command.add_option("--device", options.device, "the backend's device, by index or by a part of its name")
       ->type_name("DEVICE");
@@ -60,30 +60,79 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
   add_backend_options(command, options);
 }
 
-std::unique_ptr<Backend> open_chosen_backend(const EngineOptions& options) {
+void add_stream_backend_options(CLI::App& command, EngineOptions& options) {
+  command
+      .add_option("--lockstep", options.lockstep,
+                  "two backends that both run every frame, bit against bit, e.g. simd,opencl (slow)")
+      ->type_name("A,B");
+  command
+      .add_option(
+          "--fallback", options.fallback,
+          "backend that runs the frame again when a device is lost, or none [simd, for a backend with a driver]")
+      ->type_name("NAME");
+}
+
+namespace {
+
+BackendOptions backend_options(const EngineOptions& options) {
   if (options.threads < 0) {
     throw bad_field(kCommandLine, "--threads", std::to_string(options.threads), "give 0 for every core, or 1 or more");
   }
   BackendOptions backend_options;
   backend_options.device = options.device;
   backend_options.threads = options.threads;
+  return backend_options;
+}
+
+std::unique_ptr<Backend> open_named(const char* field, const std::string& name, const BackendOptions& options) {
   const std::vector<std::string>& names = backend_names();
-  if (!options.backend.empty()) {
-    if (std::find(names.begin(), names.end(), options.backend) == names.end()) {
-      throw bad_field(kCommandLine, "--backend", "'" + options.backend + "'",
-                      "this build has no such backend, use one of " + joined(names));
-    }
-    return open_backend(options.backend, backend_options);
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    throw bad_field(kCommandLine, field, "'" + name + "'",
+                    "this build has no such backend, use one of " + joined(names));
   }
+  return open_backend(name, options);
+}
+
+std::unique_ptr<Backend> open_first(const BackendOptions& options) {
   std::string reasons;
-  for (const std::string& name : names) {
+  for (const std::string& name : backend_names()) {
     try {
-      return open_backend(name, backend_options);
+      return open_backend(name, options);
     } catch (const Error& error) {
       reasons += "\n  " + name + ": " + error.what();
     }
   }
   throw Error("no backend opens; see berth doctor" + reasons);
+}
+
+/// Buffers in the host's own memory: there is no device to lose.
+bool runs_on_host(Backend& backend) { return backend.make_buffer(4)->host() != nullptr; }
+
+}  // namespace
+
+EngineBackends open_chosen_backends(const EngineOptions& options) {
+  EngineBackends opened;
+  const BackendOptions first_options = backend_options(options);
+  BackendOptions second_options = first_options;
+  second_options.device.clear();
+  if (!options.lockstep.empty()) {
+    const std::size_t comma = options.lockstep.find(',');
+    if (comma == std::string::npos || !options.backend.empty()) {
+      throw bad_field(kCommandLine, "--lockstep", "'" + options.lockstep + "'",
+                      "give two backends, e.g. simd,opencl, and no --backend");
+    }
+    opened.lockstep = true;
+    opened.backends.push_back(open_named("--lockstep", options.lockstep.substr(0, comma), first_options));
+    opened.backends.push_back(open_named("--lockstep", options.lockstep.substr(comma + 1), second_options));
+    return opened;
+  }
+  opened.backends.push_back(options.backend.empty() ? open_first(first_options)
+                                                    : open_named("--backend", options.backend, first_options));
+  const std::string fallback = options.fallback.empty() ? "simd" : options.fallback;
+  if (fallback != "none" && (!options.fallback.empty() || !runs_on_host(*opened.backends.front()))) {
+    opened.backends.push_back(open_named("--fallback", fallback, second_options));
+  }
+  return opened;
 }
 
 double parse_size(const std::string& text) {
@@ -120,8 +169,15 @@ DetectorConfig make_config(const EngineOptions& options) {
   return config;
 }
 
-Engine::Engine(std::unique_ptr<Backend> backend, DetectorConfig config)
-    : backend_(std::move(backend)), config_(std::move(config)) {}
+Engine::Engine(EngineBackends backends, DetectorConfig config)
+    : backends_(std::move(backends)), config_(std::move(config)) {}
+
+std::string Engine::describe() const {
+  const auto named = [](Backend& backend) { return std::string(backend.name()) + " on " + backend.device().name; };
+  std::string text = named(*backends_.backends[active_]);
+  if (backends_.lockstep) text += " in lockstep with " + named(*backends_.backends[1]);
+  return text;
+}
 
 std::string Engine::pose_refusal(int width, int height) const {
   if (!config_.camera || !(config_.marker_size_m > 0)) return "";
@@ -132,33 +188,41 @@ std::string Engine::pose_refusal(int width, int height) const {
          ": no pose; use images as the camera was calibrated, or a camera file for this size";
 }
 
-Detector& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
+Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
   const auto known = std::find_if(detectors_.begin(), detectors_.end(), [&](const Sized& sized) {
     return sized.width == image.width && sized.height == image.height;
   });
   if (known != detectors_.end()) {
     std::rotate(detectors_.begin(), known, known + 1);
-    return detectors_.front().detector;
+    return detectors_.front();
   }
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
   DetectorConfig config = config_;
   if (!(config.marker_size_m > 0) || !pose_refusal(image.width, image.height).empty()) config.camera.reset();
   if (!config.camera) config.marker_size_m = 0;
-  detectors_.insert(detectors_.begin(),
-                    {image.width, image.height, Detector(*backend_, image.width, image.height, config)});
-  detectors_.front().detector.detect(image, stamp);
-  return detectors_.front().detector;
+  Sized sized{image.width, image.height, nullptr, nullptr};
+  std::vector<Backend*> chain;
+  for (const auto& backend : backends_.backends) chain.push_back(backend.get());
+  if (backends_.lockstep) {
+    sized.pair = std::make_unique<Lockstep>(*chain[0], *chain[1], image.width, image.height, config);
+  } else {
+    sized.alone = std::make_unique<FailoverDetector>(chain, image.width, image.height, config);
+  }
+  sized.detect(image, stamp);
+  detectors_.insert(detectors_.begin(), std::move(sized));
+  return detectors_.front();
 }
 
 TimedResult Engine::detect(View2D<const u8> image, const FrameStamp& stamp) {
-  Detector& detector = detector_for(image, stamp);
+  Sized& detector = detector_for(image, stamp);
   const auto wall_start = std::chrono::steady_clock::now();
   const std::int64_t cpu_start = process_cpu_ns();
-  detector.submit(image, stamp);
-  const FrameResult& frame = detector.collect();
+  const FrameResult& frame = detector.detect(image, stamp);
   const std::int64_t cpu_ns = process_cpu_ns() - cpu_start;
   const auto wall = std::chrono::steady_clock::now() - wall_start;
-  return {frame, cpu_ns, std::chrono::duration_cast<std::chrono::nanoseconds>(wall).count()};
+  if (detector.alone) active_ = detector.alone->active();
+  return {frame, cpu_ns, std::chrono::duration_cast<std::chrono::nanoseconds>(wall).count(),
+          detector.pair ? detector.pair->difference() : std::nullopt};
 }
 
 }  // namespace berth::cli

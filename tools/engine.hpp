@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "berth/detector.hpp"
+#include "berth/failover.hpp"
+#include "berth/lockstep.hpp"
 
 namespace berth::cli {
 
@@ -20,6 +21,16 @@ struct EngineOptions {
   std::string device;
   int threads = 1;
   int max_hamming = 2;
+  /// The backend that takes over when the chosen one loses its device; "none", or empty for simd.
+  std::string fallback;
+  /// Two backends to run in lockstep, "A,B", in place of `backend`.
+  std::string lockstep;
+};
+
+/// The opened backends of an engine: in order of fail-over, or the two that run in lockstep.
+struct EngineBackends {
+  std::vector<std::unique_ptr<Backend>> backends;
+  bool lockstep = false;
 };
 
 /// --backend, --device, --threads
@@ -27,8 +38,11 @@ void add_backend_options(CLI::App& command, EngineOptions& options);
 /// The above and --family, --camera, --size, --max-hamming
 void add_engine_options(CLI::App& command, EngineOptions& options);
 
-/// The backend asked for, or the first of backend_names() that opens. Throws Error.
-std::unique_ptr<Backend> open_chosen_backend(const EngineOptions& options);
+/// --lockstep and --fallback, for streams
+void add_stream_backend_options(CLI::App& command, EngineOptions& options);
+
+/// The backend asked for, or the first of backend_names() that opens, with its fall-back; or the pair. Throws Error.
+EngineBackends open_chosen_backends(const EngineOptions& options);
 
 /// Checks every value; throws Error that names the field, its value and the remedy.
 DetectorConfig make_config(const EngineOptions& options);
@@ -43,12 +57,14 @@ struct TimedResult {
   std::int64_t cpu_ns;
   /// The same by the wall clock, ns.
   std::int64_t wall_ns;
+  /// What the two in lockstep differ in.
+  std::optional<StageDifference> difference;
 };
 
 /// Detectors for frames of any size, made when a size first comes. A camera of another size gives no pose.
 class Engine {
  public:
-  Engine(std::unique_ptr<Backend> backend, DetectorConfig config);
+  Engine(EngineBackends backends, DetectorConfig config);
 
   /// Detects; the result is valid until the next call. The detector of a size is warmed up by one detection outside the
   /// timing (first touch of its memory, kernels loaded).
@@ -58,17 +74,27 @@ class Engine {
   std::string pose_refusal(int width, int height) const;
 
   const DetectorConfig& config() const { return config_; }
-  Backend& backend() { return *backend_; }
+  /// The one whose results are given: it changes when a device is lost.
+  Backend& backend() { return *backends_.backends[active_]; }
+  /// "simd on NAME", and "in lockstep with" the other.
+  std::string describe() const;
 
  private:
   struct Sized {
     int width;
     int height;
-    Detector detector;
-  };
-  Detector& detector_for(View2D<const u8> image, const FrameStamp& stamp);
+    /// One of the two.
+    std::unique_ptr<FailoverDetector> alone;
+    std::unique_ptr<Lockstep> pair;
 
-  std::unique_ptr<Backend> backend_;
+    const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp) {
+      return pair ? pair->detect(image, stamp) : alone->detect(image, stamp);
+    }
+  };
+  Sized& detector_for(View2D<const u8> image, const FrameStamp& stamp);
+
+  EngineBackends backends_;
+  std::size_t active_ = 0;
   DetectorConfig config_;
   /// Most recently used first.
   std::vector<Sized> detectors_;

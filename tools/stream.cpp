@@ -56,7 +56,7 @@ class StreamRun {
     if (!log_) throw Error(options.log + ": the log cannot be written; check the folder and its permissions");
   }
 
-  std::uint64_t run() {
+  StreamSum run() {
     const InterruptWatch interrupt;
     while (!interrupt.came() && (options_.max_frames == 0 || frames_ < options_.max_frames)) {
       std::optional<SourceFrame> frame;
@@ -71,7 +71,7 @@ class StreamRun {
     }
     view_.finish();
     sum_up(interrupt.came());
-    return frames_with_markers_;
+    return {frames_, frames_with_markers_, differing_};
   }
 
  private:
@@ -97,8 +97,8 @@ class StreamRun {
     if (!config.camera && size_given_) console_.note("no poses: --camera is missing");
     if (config.camera && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    engine_.emplace(open_chosen_backend(engine_options), std::move(config));
-    people_ << "backend " << engine_->backend().name() << " on " << engine_->backend().device().name << '\n';
+    engine_.emplace(open_chosen_backends(engine_options), std::move(config));
+    people_ << "backend " << engine_->describe() << '\n';
   }
 
   void handle(const SourceFrame& frame) {
@@ -106,8 +106,14 @@ class StreamRun {
     const std::string refusal = engine_->pose_refusal(frame.image.width(), frame.image.height());
     if (!refusal.empty() && !refused_) console_.complain(frame.label + ": " + refusal);
     refused_ = refused_ || !refusal.empty();
+    const Backend* before = &engine_->backend();
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
     FrameResult result = timed.frame;
+    if (&engine_->backend() != before) {
+      console_.note(frame.label + ": " + before->name() + " lost its device; the frame was run again on " +
+                    engine_->describe());
+    }
+    if (timed.difference) report_difference(frame.label, *timed.difference);
     scale_poses(result.detections, frame.truth);
     ++frames_;
     frames_with_markers_ += result.detections.empty() ? 0 : 1;
@@ -132,6 +138,11 @@ class StreamRun {
     if (result.status == FrameStatus::device_lost) {
       throw Error(frame.label + ": the device was lost; see berth doctor, or use --backend simd");
     }
+  }
+
+  void report_difference(const std::string& label, const StageDifference& difference) {
+    // The first in full; a broken driver may differ in every frame to come.
+    if (++differing_ == 1) console_.note(label + ": the backends differ first in " + to_string(difference));
   }
 
   void scale_poses(std::vector<Detection>& detections, const std::vector<TruthMarker>& truth) const {
@@ -207,6 +218,7 @@ class StreamRun {
     if (by_interrupt) people_ << "interrupted\n";
     people_ << fmt::format("{} frame{}, {} with markers", frames_, frames_ == 1 ? "" : "s", frames_with_markers_);
     if (overflows_ > 0) people_ << fmt::format(", {} overflowed", overflows_);
+    if (!options_.engine.lockstep.empty()) people_ << fmt::format(", {} differing", differing_);
     if (frames_ > 0) {
       const auto mean_ms = [&](std::int64_t ns) { return ms_of(ns) / static_cast<double>(frames_); };
       people_ << fmt::format("; detection alone {:.3f} ms a frame ({:.0f} frames/s), {:.3f} ms of processor time",
@@ -261,7 +273,7 @@ class StreamRun {
   std::ofstream log_;
   std::optional<Engine> engine_;
   bool size_given_ = false, refused_ = false, has_truth_ = false;
-  std::uint64_t frames_ = 0, frames_with_markers_ = 0, overflows_ = 0;
+  std::uint64_t frames_ = 0, frames_with_markers_ = 0, overflows_ = 0, differing_ = 0;
   std::int64_t wall_ns_ = 0, cpu_ns_ = 0;
   TruthScore score_;
   std::map<MarkerKey, std::vector<Trajectory::Point>> ways_;
@@ -271,7 +283,7 @@ class StreamRun {
 
 }  // namespace
 
-std::uint64_t run_stream(Source& source, const StreamOptions& options, Console& console) {
+StreamSum run_stream(Source& source, const StreamOptions& options, Console& console) {
   return StreamRun(source, options, console).run();
 }
 

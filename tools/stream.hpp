@@ -23,9 +23,17 @@ struct StreamOptions {
   std::uint64_t max_frames = 0;
 };
 
+/// What a stream came to.
+struct StreamSum {
+  std::uint64_t frames = 0;
+  std::uint64_t with_markers = 0;
+  /// Frames in which two backends in lockstep disagreed.
+  std::uint64_t differing = 0;
+};
+
 /// Detects in every frame until the source ends, max_frames is reached or SIGINT comes; then sums up, and with a
 /// simulated source prints the errors against its truth. Families, camera and marker sizes come from the options, else
-/// from what the source knows. Returns how many frames had a marker.
-std::uint64_t run_stream(Source& source, const StreamOptions& options, Console& console);
+/// from what the source knows.
+StreamSum run_stream(Source& source, const StreamOptions& options, Console& console);
 
 }  // namespace berth::cli

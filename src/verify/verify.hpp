@@ -34,4 +34,17 @@ struct VerifyReport {
 /// Runs every case of every operation, then whole frames stage by stage, on both backends, and compares every word.
 VerifyReport verify_backend(Backend& candidate, Backend& reference, const VerifyOptions& options = {});
 
+/// When a comparison of mixed frames ends: after so many frames, and not before so many minutes.
+struct MixedOptions {
+  int frames = 0;
+  double minutes = 0;
+  /// Told after every frame: how many are done, and how many minutes that took.
+  std::function<void(int done, double minutes)> progress;
+};
+
+/// Runs mixed frames (verify/mixed_frames.hpp) through the whole docking plan, stage by stage: once on the reference,
+/// then on every candidate. A report for each candidate, of the first frame that differs.
+std::vector<VerifyReport> verify_mixed(const std::vector<Backend*>& candidates, Backend& reference,
+                                       const MixedOptions& options);
+
 }  // namespace berth

@@ -1,0 +1,63 @@
+// What the command does with several backends: verify's long runs and report, lockstep, fall-back.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "support/command_run.hpp"
+
+namespace berth {
+namespace {
+
+using test::run_berth;
+using test::ScratchFolder;
+using testing::HasSubstr;
+
+std::string scenario() { return std::string("sim:") + BERTH_SOURCE_DIR + "/scenarios/approach.toml"; }
+
+TEST(CliVerify, RunsMixedFramesAndWritesAReport) {
+  const ScratchFolder folder;
+  const std::string path = folder / "report.json";
+  const test::CommandRun run = run_berth({"verify", "--backend", "cpu", "--frames", "9", "--json", path});
+  EXPECT_EQ(run.exit_code, 0) << run.out << run.err;
+  EXPECT_THAT(run.out, HasSubstr("9 mixed frames"));
+  const nlohmann::json report = nlohmann::json::parse(test::text_of(path));
+  ASSERT_EQ(report.size(), 1u);
+  EXPECT_EQ(report[0].at("backend"), "cpu");
+  EXPECT_EQ(report[0].at("ok"), true);
+  EXPECT_EQ(report[0].at("mixed_frames"), 9);
+  EXPECT_GT(report[0].at("cases").get<int>(), 500);
+}
+
+TEST(CliVerify, ReportThatCannotBeWrittenIsAnError) {
+  const test::CommandRun run = run_berth({"verify", "--backend", "cpu", "--json", "/no/such/folder/report.json"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, HasSubstr("/no/such/folder/report.json"));
+}
+
+TEST(CliRun, LockstepComparesEveryFrame) {
+  const test::CommandRun run = run_berth({"run", "--source", scenario(), "--max-frames", "3", "--lockstep", "simd,cpu"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("in lockstep with cpu on"));
+  EXPECT_THAT(run.out, HasSubstr("3 frames, 3 with markers, 0 differing"));
+}
+
+TEST(CliRun, LockstepAndFallbackNameWhatIsWrong) {
+  const struct {
+    std::vector<std::string> arguments;
+    const char* message;
+  } cases[] = {
+      {{"--lockstep", "simd"}, "give two backends"},
+      {{"--lockstep", "simd,abacus"}, "'abacus'; this build has no such backend"},
+      {{"--lockstep", "simd,cpu", "--backend", "simd"}, "no --backend"},
+      {{"--backend", "simd", "--fallback", "abacus"}, "--fallback"},
+  };
+  for (const auto& wrong : cases) {
+    std::vector<std::string> arguments = {"run", "--source", scenario(), "--max-frames", "1"};
+    arguments.insert(arguments.end(), wrong.arguments.begin(), wrong.arguments.end());
+    const test::CommandRun run = run_berth(arguments);
+    EXPECT_EQ(run.exit_code, 2) << wrong.message;
+    EXPECT_THAT(run.err, HasSubstr(wrong.message));
+  }
+}
+
+}  // namespace
+}  // namespace berth
