@@ -73,9 +73,10 @@ Gpu::Gpu(const BackendOptions& options, const Setup& setup) : Gpu(setup) {
   if (setup.adapt) setup.adapt(api_);
   api_.vkGetDeviceQueue(logical_, device_.queue_family, 0, &queue_);
   api_.vkGetPhysicalDeviceMemoryProperties(device_.physical, &memory_);
-  const bool one_memory =
-      device_.type == VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU || device_.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  unified_ = one_memory && !options.baseline_only && memory_type(memory_, ~0u, kShared) != kNone;
+  if (options.baseline_only) return;
+  processor_ = device_.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  unified_ = (processor_ || device_.type == VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU) &&
+             memory_type(memory_, ~0u, kShared) != kNone;
 }
 
 Gpu::~Gpu() {

@@ -23,6 +23,8 @@ class Gpu {
   const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
   /// Whether buffers lie in memory that host and device share, cached and coherent.
   bool unified() const { return unified_; }
+  /// Whether it is a processor that runs the kernels with its vector units.
+  bool processor() const { return processor_; }
 
   /// Submits from any thread.
   VkResult submit(const VkSubmitInfo& info, VkFence fence) const;
@@ -43,6 +45,7 @@ class Gpu {
   mutable std::mutex queue_mutex_;
   VkPhysicalDeviceMemoryProperties memory_ = {};
   bool unified_ = false;
+  bool processor_ = false;
 };
 
 /// A buffer with memory of its own.

@@ -43,10 +43,10 @@ Handle<VkDescriptorSetLayout> make_set_layout(const Gpu& gpu, Op op) {
   return {gpu.get(), layout, gpu.api().vkDestroyDescriptorSetLayout};
 }
 
-Handle<VkPipelineLayout> make_layout(const Gpu& gpu, Op op, VkDescriptorSetLayout set_layout) {
+Handle<VkPipelineLayout> make_layout(const Gpu& gpu, Op op, VkDescriptorSetLayout set_layout, bool counts_groups) {
   VkPushConstantRange params = {};
   params.stageFlags = VK_SHADER_STAGE_COMPUTE_BIT;
-  params.size = static_cast<uint32_t>(param_bytes(op));
+  params.size = static_cast<uint32_t>(param_bytes(op)) + (counts_groups ? 4 : 0);
   VkPipelineLayoutCreateInfo info = {};
   info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   info.setLayoutCount = 1;
@@ -59,9 +59,9 @@ Handle<VkPipelineLayout> make_layout(const Gpu& gpu, Op op, VkDescriptorSetLayou
   return {gpu.get(), layout, gpu.api().vkDestroyPipelineLayout};
 }
 
-Handle<VkPipeline> make_pipeline(const Gpu& gpu, Op op, VkPipelineLayout layout, VkPipelineCache cache) {
+Handle<VkPipeline> make_pipeline(const Gpu& gpu, Op op, const SpirvKernel& kernel, VkPipelineLayout layout,
+                                 VkPipelineCache cache) {
   const std::string what = std::string("building the kernel ") + name_of(op) + " for " + gpu.device().name;
-  const SpirvKernel& kernel = spirv_kernel(op);
   VkShaderModuleCreateInfo module_info = {};
   module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
   module_info.codeSize = kernel.bytes;
@@ -90,8 +90,10 @@ Kernels make_kernels(const Gpu& gpu, const PipelineCache& file) {
   for (const Op op : all_ops()) {
     Kernel kernel;
     kernel.set_layout = make_set_layout(gpu, op);
-    kernel.layout = make_layout(gpu, op, kernel.set_layout.get());
-    kernel.pipeline = make_pipeline(gpu, op, kernel.layout.get(), cache.get());
+    const SpirvKernel& spirv = spirv_kernel(op, gpu.processor());
+    kernel.groups = static_cast<uint32_t>(spirv.groups);
+    kernel.layout = make_layout(gpu, op, kernel.set_layout.get(), spirv.groups > 1);
+    kernel.pipeline = make_pipeline(gpu, op, spirv, kernel.layout.get(), cache.get());
     kernels.push_back(std::move(kernel));
   }
   if (!file.path().empty()) {

@@ -13,6 +13,7 @@ struct Kernel {
   Handle<VkDescriptorSetLayout> set_layout;  // buffer i is binding i
   Handle<VkPipelineLayout> layout;           // that set, and the parameters as push constants
   Handle<VkPipeline> pipeline;
+  uint32_t groups = 1;  // of kGroupSize items that a work-group runs; if several, how many there are follows the params
 };
 
 /// Every operation's kernel, by the number of the operation.

@@ -111,7 +111,12 @@ void VkPlan::dispatch(VkCommandBuffer commands, const Launch& launch) const {
   api.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &launch.set, 0, nullptr);
   api.vkCmdPushConstants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<uint32_t>(launch.params.size()),
                          launch.params.data());
-  api.vkCmdDispatch(commands, launch.groups, 1, 1);
+  const uint32_t each = launch.kernel->groups;
+  if (each > 1) {
+    api.vkCmdPushConstants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, static_cast<uint32_t>(launch.params.size()),
+                           sizeof launch.groups, &launch.groups);
+  }
+  api.vkCmdDispatch(commands, (launch.groups - 1) / each + 1, 1, 1);
 }
 
 void VkPlan::record() {
