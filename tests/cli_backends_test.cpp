@@ -33,8 +33,33 @@ TEST(CliVerify, ReportThatCannotBeWrittenIsAnError) {
   EXPECT_THAT(run.err, HasSubstr("/no/such/folder/report.json"));
 }
 
+TEST(CliBench, TimesBackendsAndExplainsAFrame) {
+  const ScratchFolder folder;
+  const std::string path = folder / "bench.json";
+  const test::CommandRun run = run_berth({"bench", "--backend", "simd,cpu", "--frames", "2", "--width", "320",
+                                          "--height", "240", "--repeat", "1", "--explain", "--json", path});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("2 frames of 320x240"));
+  EXPECT_THAT(run.out, HasSubstr(" launches"));
+  const nlohmann::json report = nlohmann::json::parse(test::text_of(path));
+  ASSERT_EQ(report.size(), 2u);
+  for (const nlohmann::json& one : report) {
+    EXPECT_GT(one.at("wall_ms").get<double>(), 0);
+    const nlohmann::json& explained = one.at("explain");
+    EXPECT_EQ(explained.at("steps").size(), explained.at("launches").get<std::size_t>());
+    EXPECT_EQ(explained.at("uploaded"), 320 * 240);
+    // Every launch takes some time and touches something.
+    for (const nlohmann::json& step : explained.at("steps")) {
+      EXPECT_GE(step.at("us").get<double>(), 0);
+      EXPECT_GT(step.at("read").get<int>() + step.at("written").get<int>(), 0) << step;
+    }
+  }
+  EXPECT_EQ(report[0].at("explain").at("read"), report[1].at("explain").at("read"));
+}
+
 TEST(CliRun, LockstepComparesEveryFrame) {
-  const test::CommandRun run = run_berth({"run", "--source", scenario(), "--max-frames", "3", "--lockstep", "simd,cpu"});
+  const test::CommandRun run =
+      run_berth({"run", "--source", scenario(), "--max-frames", "3", "--lockstep", "simd,cpu"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("in lockstep with cpu on"));
   EXPECT_THAT(run.out, HasSubstr("3 frames, 3 with markers, 0 differing"));

@@ -85,14 +85,12 @@ TEST_P(LockstepFlip, IsSeenOnItsFrameAndNamedWithBothValues) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Stages, LockstepFlip,
-                         testing::Values(Flip{Op::tile_extrema, 1, 17, 3, "tile_minima"},
-                                         Flip{Op::normalize, 1, 3, 0, "normalize"},
-                                         Flip{Op::threshold, 4, 1203, 31, "threshold"},
-                                         Flip{Op::despeckle, 1, 77, 12, "despeckle"},
-                                         Flip{Op::run_link, 3, 5, 20, "run_link"},
-                                         Flip{Op::contour_trace, 2, 1, 4, "contour_trace"},
-                                         Flip{Op::halve, 1, 600, 7, "halve"}));
+INSTANTIATE_TEST_SUITE_P(
+    Stages, LockstepFlip,
+    testing::Values(Flip{Op::tile_extrema, 1, 17, 3, "tile_minima"}, Flip{Op::normalize, 1, 3, 0, "normalize"},
+                    Flip{Op::threshold, 4, 1203, 31, "threshold"}, Flip{Op::despeckle, 1, 77, 12, "despeckle"},
+                    Flip{Op::run_link, 3, 5, 20, "run_link"}, Flip{Op::contour_trace, 2, 1, 4, "contour_trace"},
+                    Flip{Op::halve, 1, 600, 7, "halve"}));
 
 TEST(Lockstep, ALostDeviceLeavesTheOthersResult) {
   const std::unique_ptr<Backend> simd = open_backend("simd");

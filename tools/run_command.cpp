@@ -15,6 +15,7 @@ constexpr const char* kExamples = R"(Examples:
   berth detect --json --family tag36h11 photos/  the same for a folder, as JSON lines
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08
   berth verify                                   every backend against the reference, bit by bit
+  berth bench --explain                          how long a frame takes on each backend, and where
   berth doctor                                   what this machine has, and what it lacks
 
 Exit codes: 0 all well; 1 verify found a difference, or a demo found nothing; 2 bad input or usage.)";
@@ -34,6 +35,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_detect(app, console, exit_code);
   add_run(app, console, exit_code);
   add_verify(app, console, exit_code);
+  add_bench(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.
   if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);
@@ -43,7 +45,8 @@ int run_command(int argc, const char* const* argv, Console& console) {
     // CLI11 tells a mistyped command only as the lack of one.
     const std::string given = argc > 1 ? argv[1] : "";
     if (app.get_subcommands().empty() && !given.empty() && given[0] != '-') {
-      console.complain("command line: field 'command' is '" + given + "'; use demo, detect, run, verify or doctor");
+      console.complain("command line: field 'command' is '" + given +
+                       "'; use demo, detect, run, verify, bench or doctor");
     } else {
       app.exit(error, console.out(), console.err());
     }

@@ -1,5 +1,6 @@
 #include "host/host_backend.hpp"
 
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <new>
@@ -56,20 +57,31 @@ class HostStream final : public Stream {
   void upload(Buffer& buffer, const void* data, std::size_t bytes) override { std::memcpy(buffer.host(), data, bytes); }
   void download(Buffer& buffer, void* data, std::size_t bytes) override { std::memcpy(data, buffer.host(), bytes); }
   void replay(Plan& plan) override {
-    for (const Call& call : static_cast<HostPlan&>(plan).calls) {
-      if (call.op.whole || pool_.threads() == 1) {
-        call.op.run(call.params.data(), call.buffers.data(), 0, call.op.whole ? 1 : call.groups);
-      } else {
-        pool_.share(call.groups, [&call](int first, int last) {
-          call.op.run(call.params.data(), call.buffers.data(), first, last);
-        });
-      }
-    }
+    for (const Call& call : static_cast<HostPlan&>(plan).calls) run(call);
   }
   std::unique_ptr<Event> record_event() override { return std::make_unique<HostEvent>(); }
   bool finish() override { return true; }
+  std::vector<std::int64_t> time_steps(Plan& plan) override {
+    std::vector<std::int64_t> times;
+    for (const Call& call : static_cast<HostPlan&>(plan).calls) {
+      const auto start = std::chrono::steady_clock::now();
+      run(call);
+      times.push_back(
+          std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - start).count());
+    }
+    return times;
+  }
 
  private:
+  void run(const Call& call) {
+    if (call.op.whole || pool_.threads() == 1) {
+      call.op.run(call.params.data(), call.buffers.data(), 0, call.op.whole ? 1 : call.groups);
+    } else {
+      pool_.share(call.groups,
+                  [&call](int first, int last) { call.op.run(call.params.data(), call.buffers.data(), first, last); });
+    }
+  }
+
   WorkerPool& pool_;
 };
 
