@@ -60,8 +60,8 @@ std::vector<BenchFrame> frames_of(const BenchCommand& command) {
   std::unique_ptr<sim::Renderer> renderer;
   for (int i = 0; i < command.frames; ++i) {
     // Spread over the whole approach.
-    const sim::Scene scene = sim::corpus_scene("dock", i * sim::kCorpusFrames / command.frames, command.width,
-                                               command.height);
+    const sim::Scene scene =
+        sim::corpus_scene("dock", i * sim::kCorpusFrames / command.frames, command.width, command.height);
     if (!renderer) renderer = std::make_unique<sim::Renderer>(scene.camera);
     frames.push_back({"dock_" + std::to_string(i), renderer->render(scene)});
   }
@@ -120,35 +120,34 @@ Json explain(Backend& backend, const BenchFrame& frame, std::ostream& out) {
   std::size_t read = 0, written = 0;
   double time_us = 0, tx1_us = 0;
   out << fmt::format("\n{} on {}, frame {}\n", backend.name(), backend.device().name, frame.name)
-                << fmt::format("  {:<18} {:>7} {:>10} {:>10} {:>9} {:>12}\n", "operation", "groups", "read KB",
-                               "written KB", "us", "TX1 least us");
+      << fmt::format("  {:<18} {:>7} {:>10} {:>10} {:>9} {:>12}\n", "operation", "groups", "read KB", "written KB",
+                     "us", "TX1 least us");
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const StepTraffic& step = steps[i];
     const double bytes = static_cast<double>(step.read + step.written);
     const double least_us = (kTx1LaunchNs + bytes / kTx1BytesPerNs) / 1e3;
     const double us = times.empty() ? 0 : static_cast<double>(times[i]) / 1e3;
     out << fmt::format("  {:<18} {:>7} {:>10.1f} {:>10.1f} {:>9} {:>12.1f}\n", name_of(step.op), step.groups,
-                                 static_cast<double>(step.read) / 1e3, static_cast<double>(step.written) / 1e3,
-                                 times.empty() ? "-" : fmt::format("{:.1f}", us), least_us);
-    list.push_back({{"operation", name_of(step.op)}, {"groups", step.groups}, {"read", step.read},
-                    {"written", step.written}});
+                       static_cast<double>(step.read) / 1e3, static_cast<double>(step.written) / 1e3,
+                       times.empty() ? "-" : fmt::format("{:.1f}", us), least_us);
+    list.push_back(
+        {{"operation", name_of(step.op)}, {"groups", step.groups}, {"read", step.read}, {"written", step.written}});
     if (!times.empty()) list.back()["us"] = us;
     read += step.read;
     written += step.written;
     time_us += us;
     tx1_us += least_us;
   }
-  out << fmt::format("  {:<18} {:>7} {:>10.1f} {:>10.1f} {:>9} {:>12.1f}\n",
-                               fmt::format("{} launches", steps.size()), "", static_cast<double>(read) / 1e3,
-                               static_cast<double>(written) / 1e3, times.empty() ? "-" : fmt::format("{:.1f}", time_us),
-                               tx1_us)
-                << fmt::format("  upload {:.1f} KB, download {:.1f} KB, device memory {:.1f} MB\n",
-                               static_cast<double>(padded.size()) / 1e3, static_cast<double>(downloaded) / 1e3,
-                               static_cast<double>(plan.device_bytes()) / 1e6)
-                << fmt::format("  TX1 least: {:.1f} GB/s and {:.0f} us a launch; arithmetic is not counted\n",
-                               kTx1BytesPerNs, kTx1LaunchNs / 1e3);
-  return {{"launches", steps.size()}, {"read", read},         {"written", written},
-          {"uploaded", padded.size()}, {"downloaded", downloaded}, {"steps", list}};
+  out << fmt::format("  {:<18} {:>7} {:>10.1f} {:>10.1f} {:>9} {:>12.1f}\n", fmt::format("{} launches", steps.size()),
+                     "", static_cast<double>(read) / 1e3, static_cast<double>(written) / 1e3,
+                     times.empty() ? "-" : fmt::format("{:.1f}", time_us), tx1_us)
+      << fmt::format("  upload {:.1f} KB, download {:.1f} KB, device memory {:.1f} MB\n",
+                     static_cast<double>(padded.size()) / 1e3, static_cast<double>(downloaded) / 1e3,
+                     static_cast<double>(plan.device_bytes()) / 1e6)
+      << fmt::format("  TX1 least: {:.1f} GB/s and {:.0f} us a launch; arithmetic is not counted\n", kTx1BytesPerNs,
+                     kTx1LaunchNs / 1e3);
+  return {{"launches", steps.size()}, {"read", read}, {"written", written}, {"uploaded", padded.size()},
+          {"downloaded", downloaded}, {"steps", list}};
 }
 
 int run_bench(const BenchCommand& command, Console& console) {
@@ -177,14 +176,18 @@ int run_bench(const BenchCommand& command, Console& console) {
     }
     Engine engine(std::move(backends), DetectorConfig{});
     const Times times = measure(engine, frames, command.repeat);
-    console.out() << fmt::format("{:<10} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>10.0f}  {}\n", name, times.wall,
-                                 times.wall_p95, times.device, times.decode, times.processor, 1e3 / times.wall,
-                                 engine.backend().device().name)
+    console.out() << fmt::format("{:<10} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>10.0f}  {}\n", name,
+                                 times.wall, times.wall_p95, times.device, times.decode, times.processor,
+                                 1e3 / times.wall, engine.backend().device().name)
                   << std::flush;
-    Json json = {{"backend", name},           {"device", engine.backend().device().name},
-                 {"driver", engine.backend().device().driver}, {"wall_ms", times.wall},
-                 {"wall_p95_ms", times.wall_p95}, {"device_ms", times.device},
-                 {"decode_ms", times.decode}, {"processor_ms", times.processor}};
+    Json json = {{"backend", name},
+                 {"device", engine.backend().device().name},
+                 {"driver", engine.backend().device().driver},
+                 {"wall_ms", times.wall},
+                 {"wall_p95_ms", times.wall_p95},
+                 {"device_ms", times.device},
+                 {"decode_ms", times.decode},
+                 {"processor_ms", times.processor}};
     if (command.explain) json["explain"] = explain(engine.backend(), frames[frames.size() / 2], explanations);
     report.push_back(json);
   }
@@ -193,7 +196,8 @@ int run_bench(const BenchCommand& command, Console& console) {
   std::ofstream file(command.report, std::ios::binary);
   file << to_line(report) << '\n';
   file.close();
-  if (!file) throw Error(command.report + ": the report cannot be written; check the folder, its permissions and space");
+  if (!file)
+    throw Error(command.report + ": the report cannot be written; check the folder, its permissions and space");
   return kOk;
 }
 

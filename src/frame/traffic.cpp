@@ -11,7 +11,8 @@ std::size_t slot_words(const std::vector<u32>& words, std::size_t width) {
   std::size_t touched = 0;
   for (std::size_t at = 0; at < words.size(); at += width) {
     const auto begin = words.begin() + static_cast<std::ptrdiff_t>(at);
-    const bool used = std::any_of(begin, begin + static_cast<std::ptrdiff_t>(width), [](u32 word) { return word != 0; });
+    const bool used =
+        std::any_of(begin, begin + static_cast<std::ptrdiff_t>(width), [](u32 word) { return word != 0; });
     touched += used ? width : 1;
   }
   return touched;

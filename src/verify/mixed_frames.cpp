@@ -22,7 +22,8 @@ MixedFrames::Frame MixedFrames::make(int index) {
   const int seed = index / kKinds;
   const std::string number = "_" + std::to_string(seed);
   const u64 random = static_cast<u64>(index) * 2654435761u + 1;
-  if (kind == 7) return {"noise" + number, pictures::noise(width, height, {90, 97, 98, 104, 108, 118, 119, 140}, random)};
+  if (kind == 7)
+    return {"noise" + number, pictures::noise(width, height, {90, 97, 98, 104, 108, 118, 119, 140}, random)};
   if (kind == 8) return {"mazes" + number, pictures::mazes(width, height, random)};
   if (kind == 9) return {"quads" + number, pictures::quads(width, height, 24, 4, random)};
   const std::string& corpus = sim::corpus_names()[static_cast<std::size_t>(kind)];
