@@ -86,8 +86,7 @@ class Shuffled final : public Backend {
 
 // 5. The entry for the registry. A device whose driver is missing leaves the list empty and says why in `absent`.
 BackendEntry entry() {
-  return {"shuffled",
-          [](std::string&) { return std::vector<DeviceInfo>{host::processor("groups in any order")}; },
+  return {"shuffled", [](std::string&) { return std::vector<DeviceInfo>{host::processor("groups in any order")}; },
           [](const BackendOptions& options) -> std::unique_ptr<Backend> {
             host::check_device("shuffled", options);
             return std::make_unique<Shuffled>();
