@@ -17,8 +17,8 @@ constexpr std::size_t kMostStaging = std::size_t{32} << 20;
 
 class VkBackend final : public Backend {
  public:
-  VkBackend(const BackendOptions& options, const Setup& setup)
-      : gpu_(options, setup),
+  VkBackend(const BackendOptions& options, const Instruments& instruments)
+      : gpu_(options, instruments),
         kernels_(make_kernels(gpu_, PipelineCache(cache_folder(options.cache_dir), gpu_.device().properties))) {}
 
   const char* name() const override { return "vulkan"; }
@@ -58,7 +58,7 @@ std::vector<DeviceInfo> devices(std::string& absent_reason) {
   absent_reason.clear();
   std::vector<DeviceInfo> infos;
   try {
-    const Instance instance{Setup()};
+    const Instance instance{Instruments()};
     for (const Device& device : find_devices(instance)) infos.push_back({device.name, device.driver});
   } catch (const Error& error) {
     absent_reason = error.what();
@@ -66,10 +66,10 @@ std::vector<DeviceInfo> devices(std::string& absent_reason) {
   return infos;
 }
 
-std::unique_ptr<Backend> open(const BackendOptions& options) { return open(options, Setup()); }
+std::unique_ptr<Backend> open(const BackendOptions& options) { return open(options, Instruments()); }
 
-std::unique_ptr<Backend> open(const BackendOptions& options, const Setup& setup) {
-  return std::make_unique<VkBackend>(options, setup);
+std::unique_ptr<Backend> open(const BackendOptions& options, const Instruments& instruments) {
+  return std::make_unique<VkBackend>(options, instruments);
 }
 
 BackendEntry entry() { return {"vulkan", &devices, &open}; }

@@ -55,7 +55,7 @@ Memory make_memory(const Gpu& gpu, std::size_t bytes, VkBufferUsageFlags usage,
 
 }  // namespace
 
-Gpu::Gpu(const BackendOptions& options, const Setup& setup) : Gpu(setup) {
+Gpu::Gpu(const BackendOptions& options, const Instruments& instruments) : Gpu(instruments) {
   const std::vector<Device> found = find_devices(instance_);
   device_ = found[choose_device(found, options.device)];
   const float priority = 1.0F;
@@ -70,7 +70,7 @@ Gpu::Gpu(const BackendOptions& options, const Setup& setup) : Gpu(setup) {
   info.pQueueCreateInfos = &queue;
   check(api_.vkCreateDevice(device_.physical, &info, nullptr, &logical_), "opening " + device_.name);
   load_device(api_, logical_);
-  if (setup.adapt) setup.adapt(api_);
+  if (instruments.adapt) instruments.adapt(api_);
   api_.vkGetDeviceQueue(logical_, device_.queue_family, 0, &queue_);
   api_.vkGetPhysicalDeviceMemoryProperties(device_.physical, &memory_);
   if (options.baseline_only) return;

@@ -12,7 +12,7 @@ namespace berth::vulkan {
 class Gpu {
  public:
   /// Opens the device that options.device names. Throws Error when there is no such, naming those there are.
-  Gpu(const BackendOptions& options, const Setup& setup);
+  Gpu(const BackendOptions& options, const Instruments& instruments);
   ~Gpu();
   Gpu(const Gpu&) = delete;
   Gpu& operator=(const Gpu&) = delete;
@@ -35,7 +35,7 @@ class Gpu {
   Handle<VkFence> make_fence() const;
 
  private:
-  explicit Gpu(const Setup& setup) : instance_(setup), api_(instance_.api()) {}
+  explicit Gpu(const Instruments& instruments) : instance_(instruments), api_(instance_.api()) {}
 
   Instance instance_;
   Api api_;

@@ -41,8 +41,8 @@ std::string driver_places() {
 
 Instance::Instance() : api_(load_api()) {}
 
-Instance::Instance(const Setup& setup) : Instance() {
-  on_message_ = setup.on_message;
+Instance::Instance(const Instruments& instruments) : Instance() {
+  on_message_ = instruments.on_message;
   uint32_t version = 0;
   check(api_.vkEnumerateInstanceVersion(&version), "asking for the loader's version");
   if (version < VK_API_VERSION_1_1) throw Error("vulkan: the loader is older than Vulkan 1.1; apt install libvulkan1");
@@ -63,7 +63,7 @@ Instance::Instance(const Setup& setup) : Instance() {
     throw Error(std::string("vulkan: no ") + kValidationLayer + "; apt install vulkan-validationlayers");
   }
   std::vector<VkValidationFeatureEnableEXT> checks = {VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
-  if (setup.gpu_assisted) {
+  if (instruments.gpu_assisted) {
     checks.push_back(VK_VALIDATION_FEATURE_ENABLE_GPU_ASSISTED_EXT);
     checks.push_back(VK_VALIDATION_FEATURE_ENABLE_GPU_ASSISTED_RESERVE_BINDING_SLOT_EXT);
   }

@@ -9,7 +9,7 @@
 namespace berth::vulkan {
 
 /// What a developer or a test asks for beyond BackendOptions.
-struct Setup {
+struct Instruments {
   /// Switches the Khronos validation layer on (core and synchronization checks) and gets every message of it: warnings
   /// and errors, from any thread. The layer must be installed: apt install vulkan-validationlayers.
   std::function<void(const std::string& message)> on_message;
@@ -22,7 +22,7 @@ struct Setup {
 /// A Vulkan instance, with the functions of it in api(). Throws Error with the reason and the remedy.
 class Instance {
  public:
-  explicit Instance(const Setup& setup);
+  explicit Instance(const Instruments& instruments);
   ~Instance();
   Instance(const Instance&) = delete;
   Instance& operator=(const Instance&) = delete;
