@@ -95,17 +95,25 @@ HWY_INLINE void set_step(u32* nodes, u32 id, u32 next) {
   std::memcpy(reinterpret_cast<unsigned char*>(nodes + id) + 2, &step, sizeof step);  // little-endian
 }
 
-// The overlaps of one row's runs with those of the row above, in raster order. Ranks among the run starts of a word are
-// popcounts, so the runs of an overlap are known without looking at their ends.
-HWY_INLINE void link_rows(const u32* above, const u32* here, int row_words, u32 above_begin, u32 here_begin,
-                          u32* nodes) {
+/// Ids of the runs above and here, by their starts, for each overlap of one row in raster order.
+struct Overlaps {
+  static constexpr int kBatch = 4;
+  int count = 0;
+  // A row of 16384 px has at most every other pixel of its own.
+  u32 up[8192 + kBatch];
+  u32 low[8192 + kBatch];
+};
+
+// Ranks among the run starts of a word are popcounts, so the runs of an overlap are known without looking at their
+// ends. Batches as in run_emit.
+HWY_INLINE void find_overlaps(const u32* above, const u32* here, int row_words, u32 above_begin, u32 here_begin,
+                              Overlaps& found) {
   u64 above_carry = 0;
   u64 here_carry = 0;
   u64 both_carry = 0;
   u32 up_before = above_begin;  // id of the first start in this word
   u32 low_before = here_begin;
-  u32 last_up = ~0u;
-  u32 last_low = ~0u;
+  int count = 0;
   for (int x = 0; x < row_words; x += 2) {
     const u64 a = wide_word(above, x, row_words);
     const u64 b = wide_word(here, x, row_words);
@@ -116,22 +124,39 @@ HWY_INLINE void link_rows(const u32* above, const u32* here, int row_words, u32 
     above_carry = a >> 63;
     here_carry = b >> 63;
     both_carry = both >> 63;
-    for (; overlaps != 0; overlaps &= overlaps - 1) {
-      const u64 through = overlaps ^ (overlaps - 1);  // bits up to the overlap's first
-      const u32 up = up_before + 2 * popcount(above_starts & through) - 2;
-      const u32 low = low_before + 2 * popcount(here_starts & through) - 2;
-      const bool first_of_low = low != last_low;
-      const bool first_of_up = up != last_up;
-      const u32 from = first_of_low ? low : up - 1;
-      const u32 to = first_of_low && !first_of_up ? low - 1 : up;
-      set_step(nodes, from, to);
-      // Right for the last overlap of both; any later one writes it again.
-      set_step(nodes, up + 1, low + 1);
-      last_up = up;
-      last_low = low;
+    const int end = count + static_cast<int>(popcount(overlaps));
+    for (int at = count; at < end; at += Overlaps::kBatch) {
+      for (int i = 0; i < Overlaps::kBatch; ++i) {
+        const u64 through = overlaps ^ (overlaps - 1);  // bits up to the overlap's first
+        found.up[at + i] = up_before + 2 * popcount(above_starts & through) - 2;
+        found.low[at + i] = low_before + 2 * popcount(here_starts & through) - 2;
+        overlaps &= overlaps - 1;
+      }
     }
+    count = end;
     up_before += 2 * popcount(above_starts);
     low_before += 2 * popcount(here_starts);
+  }
+  found.count = count;
+}
+
+HWY_INLINE void link_rows(const Overlaps& overlaps, u32* nodes) {
+  u32 last_up = ~0u;
+  u32 last_low = ~0u;
+  for (int i = 0; i < overlaps.count; ++i) {
+    const u32 up = overlaps.up[i];
+    const u32 low = overlaps.low[i];
+    // Which of the cases it is nobody can foresee: masks, not branches.
+    const u32 first_of_low = low != last_low ? ~0u : 0u;
+    const u32 again_of_up = up == last_up ? ~0u : 0u;
+    const u32 from = (low & first_of_low) | ((up - 1) & ~first_of_low);
+    const u32 notch = first_of_low & again_of_up;
+    const u32 to = ((low - 1) & notch) | (up & ~notch);
+    set_step(nodes, from, to);
+    // Right for the last overlap of both; any later one writes it again.
+    set_step(nodes, up + 1, low + 1);
+    last_up = up;
+    last_low = low;
   }
 }
 
@@ -148,6 +173,8 @@ void run_link(const run_link_params& p, const u32* bits, const u32* offsets, con
   }
   for (; id < kept; ++id) nodes[id] = cracks[id] | (id % 2 == 0 ? 0x00010000u : 0xffff0000u);
 
+  static thread_local Overlaps kept_overlaps;
+  Overlaps& overlaps = kept_overlaps;
   u32 above_begin = 0;
   u32 here_begin = reference::run_ends_before(offsets, p.base_at, p.row_words);
   for (int y = 1; y < p.height; ++y) {
@@ -155,7 +182,8 @@ void run_link(const run_link_params& p, const u32* bits, const u32* offsets, con
     if (here_end > static_cast<u32>(kept)) return;
     if (here_begin != above_begin && here_end != here_begin) {
       const u32* here = bits + static_cast<std::ptrdiff_t>(y) * p.row_words;
-      link_rows(here - p.row_words, here, p.row_words, above_begin, here_begin, nodes);
+      find_overlaps(here - p.row_words, here, p.row_words, above_begin, here_begin, overlaps);
+      link_rows(overlaps, nodes);
     }
     above_begin = here_begin;
     here_begin = here_end;
