@@ -100,7 +100,8 @@ TEST_P(CudaFailure, OfWhatIsThereIsExplained) {
   driver.fake_cuda_set_version(9020);
   EXPECT_THAT(absence(), StartsWith("cuda: the driver is for CUDA 9.2; Berth needs one for CUDA 10.2 or later"));
   driver.fake_cuda_set_version(10020);
-  EXPECT_NE(open({}), nullptr);
+  second.device = "1";
+  EXPECT_NE(open(second), nullptr);
   driver.fake_cuda_fail("cuInit", 1, 803, false);
   EXPECT_THAT(error_of([] { open({}); }), HasSubstr("starting the driver failed (803); does nvidia-smi work?"));
 }
