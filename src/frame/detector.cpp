@@ -132,7 +132,10 @@ struct Detector::Impl {
     refused.reserve(slots);
     if (!staging.empty()) {  // drivers may finish compiling at the first launch: not in the first frame's time
       stream->replay(plan.plan());
-      stream->finish();
+      if (!stream->finish()) {
+        throw Error(std::string(backend.name()) + ": " + backend.device().name +
+                    " was lost on the first, empty frame; see berth doctor, or use another backend");
+      }
     }
   }
 
