@@ -144,16 +144,23 @@ TEST(VulkanStaging, GivesRoomInTurnAndTakesItBackInTurn) {
 
 TEST(VulkanStaging, CountsTheGapAtTheEnd) {
   StagingRing ring({}, 64);
-  EXPECT_EQ(ring.take(48), 0u);
+  EXPECT_EQ(ring.take(32), 0u);
   const std::size_t first = ring.mark();
-  EXPECT_EQ(ring.take(16), 48u);
+  EXPECT_EQ(ring.take(16), 32u);
   const std::size_t second = ring.mark();
   ring.give_back(first);
-  EXPECT_EQ(ring.take(32), 0u);
+  EXPECT_EQ(ring.take(32), 0u) << "not over the end";
   const std::size_t third = ring.mark();
+  EXPECT_EQ(third, 48u) << "with the 16 left out there";
+  EXPECT_EQ(ring.take(16), StagingRing::kNoRoom);
   ring.give_back(second);
-  EXPECT_EQ(ring.take(32), StagingRing::kNoRoom) << "16 at the front's end, 16 at the ring's end, none in a row";
+  EXPECT_EQ(ring.take(16), 32u);
+  const std::size_t fourth = ring.mark();
+  EXPECT_EQ(ring.take(16), StagingRing::kNoRoom) << "the gap goes with what came after it";
   ring.give_back(third);
+  EXPECT_EQ(ring.take(16), 48u);
+  ring.give_back(fourth);
+  ring.give_back(ring.mark());
   EXPECT_EQ(ring.take(64), 0u);
 }
 

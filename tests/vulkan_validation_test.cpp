@@ -1,6 +1,7 @@
 // Everything that Berth does with Vulkan, under the Khronos validation layer (core and synchronization checks, and
 // GPU-assisted ones where they start): not one message. And what a frame may not do once a detector is made.
 #ifdef BERTH_WITH_VULKAN
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,6 +43,8 @@ class Messages {
 
 class VulkanValidation : public ::testing::TestWithParam<bool> {
  protected:
+  // It leaks, and LeakSanitizer can only leave it alone (support/lsan.supp) while it is loaded.
+  static void SetUpTestSuite() { dlopen("libVkLayer_khronos_validation.so", RTLD_NOW | RTLD_NODELETE); }
   void SetUp() override {
     std::string absent;
     if (devices(absent).empty()) GTEST_SKIP() << absent;

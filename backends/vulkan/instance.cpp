@@ -28,6 +28,19 @@ bool has_layer(const Api& api, const char* wanted) {
   return false;
 }
 
+/// Drivers stay loaded from the first instance on: the loader would unload them with the last one, but they have
+/// threads and memory that outlive it, and loading them again takes longer than a frame.
+void keep_drivers(const Api& api, const VkApplicationInfo* application) {
+  static const VkInstance kept = [&] {
+    VkInstanceCreateInfo info = {};
+    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+    info.pApplicationInfo = application;
+    VkInstance instance = nullptr;
+    return api.vkCreateInstance(&info, nullptr, &instance) == VK_SUCCESS ? instance : nullptr;
+  }();
+  static_cast<void>(kept);
+}
+
 /// Where the loader was told to look for drivers, or where it looks anyway.
 std::string driver_places() {
   for (const char* name : {"VK_DRIVER_FILES", "VK_ICD_FILENAMES"}) {
@@ -101,6 +114,7 @@ void Instance::create(const VkInstanceCreateInfo& info) {
                 "; apt install mesa-vulkan-drivers (it also runs on the CPU) or your GPU's Vulkan driver");
   }
   check(result, "starting the drivers");
+  keep_drivers(api_, info.pApplicationInfo);
   load_instance(api_, instance_);
 }
 
