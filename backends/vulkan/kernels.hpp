@@ -19,8 +19,8 @@ struct Kernel {
 /// Every operation's kernel, by the number of the operation.
 using Kernels = std::vector<Kernel>;
 
-/// Makes them with what the cache holds, and keeps there what it did not. Throws Error with the operation that the
+/// Makes them with what the file holds, and keeps there what it did not. Throws Error with the operation that the
 /// driver refuses.
-Kernels make_kernels(const Gpu& gpu, const PipelineCache& cache);
+Kernels make_kernels(const Gpu& gpu, const PipelineCache& file);
 
 }  // namespace berth::vulkan
