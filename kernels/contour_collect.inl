@@ -5,14 +5,15 @@ IN(0, u32, spans)
 IN(1, u32, offsets)
 OUT(2, u32, contours)  // [CONTOUR_HEADER + max_contours * CONTOUR_WORDS]: see ops.h
 PARAMS(contour_collect)
+LANES_IF(true)  // 128 items look through at most 15 rows
 SHARED(u32, ranks, 128)
 SHARED(u32, starts, 128)
 BODY
   EACH_ITEM
-    ranks[LID] = GROUP < p.groups ? spans[GID] : 0u;
+    // Most groups begin no contour: nothing to number.
+    if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) ranks[LID] = spans[GID];
   EACH_END
   FIRST_ITEMS(1) {
-    // Most groups begin no contour: nothing to number.
     if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
       u32 rank = spans[p.totals_at + GROUP];
       u32 start = spans[p.totals_at + p.groups + 1 + GROUP];
@@ -30,7 +31,7 @@ BODY
   BARRIER;
   EACH_ITEM
     const u32 needed = spans[p.totals_at + p.groups];
-    if (GROUP < p.groups) {
+    if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
       const u32 span = spans[GID];
       if (span != 0u && ranks[LID] < U32(p.max_contours)) {
         const u32 id = U32(GID) * 2u;

@@ -13,6 +13,7 @@ IN(1, u32, levels)
 IN(2, s32, quads)
 OUT(3, s32, edges)  // [max_contours, EDGE_WORDS]: see ops.h; nothing is written where there is no quadrilateral
 PARAMS(edge_refine)
+LANES_IF(true)  // 128 stations of at most six pixels
 SHARED(int, offset, 128)
 SHARED(int, along, 128)  // u of the station about the side's middle
 BODY

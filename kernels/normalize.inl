@@ -6,6 +6,7 @@ KERNEL(normalize)
 IN(0, u32, histograms)  // [groups, 3, 256]
 OUT(1, u32, levels)     // [4]: black, white, noise, contrast
 PARAMS(normalize)
+LANES_IF(p.groups <= 32)  // 768 turns a partial histogram
 SHARED(u32, counts, 768)
 SHARED(u32, quantiles, 3)
 BODY

@@ -134,6 +134,8 @@ struct contour_trace_params {
 struct quad_fit_params {
   int max_contours;
   int min_side_px; /* least length of a side, px */
+  int max_width;   /* no contour is wider or higher, px: for devices to choose how they run it */
+  int max_height;
 };
 
 struct edge_refine_params {

@@ -4,6 +4,7 @@ KERNEL(run_count)
 IN(0, u32, bits)      // [height, row_words]
 OUT(1, u32, offsets)  // [base_at + groups]; words past the last of bits count nothing
 PARAMS(run_count)
+LANES_IF(true)  // 512 turns
 SHARED(u32, sums, 128)
 BODY
   EACH_ITEM

@@ -24,14 +24,18 @@ BODY
         const u32 word_begin = RUN_ENDS_BEFORE(GID);
         const u32 word_end =
             word_begin + POPCOUNT(RUN_EDGES(y, word_x)) + (word_x == p.row_words - 1 ? bits[GID] >> 31 : 0u);
+        // The cracks of this word lie over the same words above and below.
+        const u32 above_begin = y > 0 ? RUN_ENDS_BEFORE(GID - p.row_words) : 0u;
+        const u32 above_edges = y > 0 ? RUN_EDGES(y - 1, word_x) : 0u;
+        const u32 below_begin = has_below ? RUN_ENDS_BEFORE(GID + p.row_words) : 0u;
+        const u32 below_edges = has_below ? RUN_EDGES(y + 1, word_x) : 0u;
         for (u32 id = word_begin; id < word_end; id += 1u) {
           const u32 x = cracks[id];
+          const int pixel = S32(x) - word_x * 32;  // 32 where the row ends black
           u32 next = id ^ 1u;
           if ((id & 1u) == 0u) {
             if (y > 0) {
-              const int at = S32(x >> 5);
-              const u32 after = RUN_ENDS_BEFORE((y - 1) * p.row_words + at) +
-                                POPCOUNT(RUN_EDGES(y - 1, at) & bits_through(S32(x & 31u)));
+              const u32 after = above_begin + POPCOUNT(above_edges & bits_below(pixel + 1));
               if ((after & 1u) != 0u) {  // the pixel above is black: its run began at after - 1
                 next = id > row_begin && cracks[id - 1u] > cracks[after - 1u] ? id - 1u : after - 1u;
               } else if (after < row_begin && cracks[after] < cracks[id + 1u]) {
@@ -39,10 +43,7 @@ BODY
               }
             }
           } else if (has_below) {
-            const int last = S32(x) - 1;  // the run's last pixel
-            const int at = last >> 5;
-            const u32 after =
-                RUN_ENDS_BEFORE((y + 1) * p.row_words + at) + POPCOUNT(RUN_EDGES(y + 1, at) & bits_through(last & 31));
+            const u32 after = below_begin + POPCOUNT(below_edges & bits_below(pixel));  // past the run's last pixel
             if ((after & 1u) != 0u) {
               next = id + 1u < row_end && cracks[id + 1u] < cracks[after] ? id + 1u : after;
             } else if (after > row_end && cracks[after - 1u] > cracks[id - 1u]) {

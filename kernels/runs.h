@@ -7,8 +7,8 @@
 FN u32 run_edges(u32 here, u32 before) { return here ^ ((here << 1) | (before >> 31)); }
 #define RUN_EDGES(row, x) run_edges(bits[(row)*p.row_words + (x)], (x) > 0 ? bits[(row)*p.row_words + (x)-1] : 0u)
 
-// Bits 0 … i of a word.
-FN u32 bits_through(int i) { return (2u << i) - 1u; }
+// The lowest n bits of a word, n from 0 to 32.
+FN u32 bits_below(int n) { return n == 0 ? 0u : (2u << (n - 1)) - 1u; }
 FN int lowest_bit(u32 word) { return S32(POPCOUNT((word & (0u - word)) - 1u)); }
 
 // A node's crack and the step to its successor.

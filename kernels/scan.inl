@@ -2,6 +2,7 @@
 KERNEL(scan)
 INOUT(0, u32, values)  // [first + count + 1]
 PARAMS(scan)
+LANES_IF(p.count < 16384)  // two turns a value
 SHARED(u32, sums, 128)
 BODY
   EACH_ITEM

@@ -1,10 +1,10 @@
 # The kernel text as SPIR-V, for Vulkan.
 #
 # berth_embed_spirv(OUT): sets OUT to a generated source that defines spirv_kernel() of spirv_kernels.hpp. Each
-# operation of ops.h becomes a shader of its own, and another for processors where its items share memory (see
+# operation of ops.h becomes a shader of its own, and another for processors where its text says LANES_IF (see
 # prelude/glsl.h), compiled by glslangValidator and checked by spirv-val.
 #
-# Run as a script (cmake -DMODULES=a.spv;b.spv;b.lanes.spv -DLANES=8 -DOUT=… -P spirv.cmake) it writes that source.
+# Run as a script (cmake -DKERNELS=… -DMODULES=a.spv;b.lanes.spv;b.spv -DLANES=8 -DOUT=… -P spirv.cmake) it writes that source.
 if(CMAKE_SCRIPT_MODE_FILE)
   set(source "// Generated from kernels/ by kernels/spirv.cmake.\n#include \"spirv_kernels.hpp\"\n\nnamespace berth {\n")
   string(APPEND source "namespace {\n\n")
@@ -14,21 +14,26 @@ if(CMAKE_SCRIPT_MODE_FILE)
     file(READ ${module} bytes HEX)
     string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1u," words "${bytes}")
     if(module MATCHES "\\.lanes\\.spv$")
-      string(APPEND source "const u32 ${op}_lanes[] = {${words}};\n")
-      set(lanes_of_${op} "{${op}_lanes, sizeof ${op}_lanes, ${LANES}}")
+      file(STRINGS ${KERNELS}/${op}.inl condition REGEX "^LANES_IF\\(")
+      string(REGEX REPLACE "^LANES_IF\\((.*)\\).*" "\\1" condition "${condition}")
+      string(APPEND source "const u32 ${op}_lanes[] = {${words}};\n"
+                           "bool ${op}_lanes_if(const void* params) {\n"
+                           "  [[maybe_unused]] const auto& p = *static_cast<const ${op}_params*>(params);\n"
+                           "  return ${condition};\n}\n")
+      set(lanes_of_${op} "{${op}_lanes, sizeof ${op}_lanes, ${LANES}, &${op}_lanes_if}")
     else()
       string(APPEND source "const u32 ${op}[] = {${words}};\n")
-      set(lanes_of_${op} "{${op}, sizeof ${op}, 1}")
+      set(lanes_of_${op} "{nullptr, 0, 0, nullptr}")
       list(APPEND ops ${op})
     endif()
   endforeach()
   set(table "")
   foreach(op IN LISTS ops)
-    string(APPEND table "  case Op::${op}: {\n    static const SpirvKernel kernels[] = {{${op}, sizeof ${op}, 1}, "
-                        "${lanes_of_${op}}};\n    return kernels[for_processor ? 1 : 0];\n  }\n")
+    string(APPEND table "  case Op::${op}: {\n    static const SpirvKernel kernels[] = {{${op}, sizeof ${op}, 1, nullptr}, "
+                        "${lanes_of_${op}}};\n    return kernels[lanes ? 1 : 0];\n  }\n")
   endforeach()
-  string(APPEND source "const SpirvKernel none = {nullptr, 0, 0};\n\n}  // namespace\n\n"
-                       "const SpirvKernel& spirv_kernel(Op op, bool for_processor) {\n  switch (op) {\n${table}  }\n"
+  string(APPEND source "const SpirvKernel none = {nullptr, 0, 0, nullptr};\n\n}  // namespace\n\n"
+                       "const SpirvKernel& spirv_kernel(Op op, bool lanes) {\n  switch (op) {\n${table}  }\n"
                        "  return none;\n}\n\n}  // namespace berth\n")
   file(WRITE ${OUT} "${source}")
   return()
@@ -63,9 +68,10 @@ function(berth_embed_spirv out)
 ")
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/${op}.inl)
     file(STRINGS ${BERTH_KERNELS_DIR}/${op}.inl shared REGEX "^SHARED\\(")
-    set(variants ${op}.lanes ${op})
-    if(NOT shared)
-      set(variants ${op})
+    file(STRINGS ${BERTH_KERNELS_DIR}/${op}.inl lanes_if REGEX "^LANES_IF\\(")
+    set(variants ${op})
+    if(lanes_if)
+      list(APPEND variants ${op}.lanes)
     endif()
     foreach(variant IN LISTS variants)
       set(definition "")
@@ -81,13 +87,13 @@ function(berth_embed_spirv out)
         COMMAND ${BERTH_SPIRV_VAL} --target-env vulkan1.1 ${folder}/${variant}.spv
         DEPENDS ${texts} ${folder}/${op}.comp
         COMMENT "Compiling ${variant} to SPIR-V" VERBATIM)
-      list(INSERT modules 0 ${folder}/${variant}.spv)
+      list(APPEND modules ${folder}/${variant}.spv)
     endforeach()
   endforeach()
   set(source ${CMAKE_CURRENT_BINARY_DIR}/spirv_kernels.cpp)
   add_custom_command(
     OUTPUT ${source}
-    COMMAND ${CMAKE_COMMAND} "-DMODULES=${modules}" -DLANES=${lanes} -DOUT=${source} -P ${BERTH_SPIRV_SCRIPT}
+    COMMAND ${CMAKE_COMMAND} -DKERNELS=${BERTH_KERNELS_DIR} "-DMODULES=${modules}" -DLANES=${lanes} -DOUT=${source} -P ${BERTH_SPIRV_SCRIPT}
     DEPENDS ${modules} ${BERTH_SPIRV_SCRIPT}
     COMMENT "Embedding the SPIR-V kernels" VERBATIM)
   set(${out} ${source} PARENT_SCOPE)

@@ -14,9 +14,11 @@ struct SpirvKernel {
   /// Groups of kGroupSize items that a Vulkan work-group runs: one, with an invocation an item; or several, with an
   /// invocation a group, and the number of groups follows the parameters as one more int.
   int groups;
+  /// Whether several may be run with these parameters; null where one is. See prelude/glsl.h.
+  bool (*applies)(const void* params);
 };
 
-/// The kernel for GPUs, or the one for processors. They are the same where items share nothing.
-const SpirvKernel& spirv_kernel(Op op, bool for_processor);
+/// The kernel for every device; or the one for the lanes of a processor, without words where there is none.
+const SpirvKernel& spirv_kernel(Op op, bool lanes);
 
 }  // namespace berth

@@ -5,6 +5,7 @@ IN(0, u32, minima)       // [words]
 IN(1, u32, maxima)       // [words]
 OUT(2, u32, histograms)  // [groups, 3, 256]: minima, maxima, ranges
 PARAMS(tile_histogram)
+LANES_IF(p.words / (p.groups * p.step) < 8192)  // a turn for each word counted and each of its tiles
 SHARED(u32, counts, 768)
 BODY
   EACH_ITEM

@@ -81,20 +81,34 @@ Handle<VkPipeline> make_pipeline(const Gpu& gpu, Op op, const SpirvKernel& kerne
   return {gpu.get(), pipeline, gpu.api().vkDestroyPipeline};
 }
 
+Kernel make_kernel(const Gpu& gpu, Op op, const SpirvKernel& spirv, VkPipelineCache cache) {
+  Kernel kernel;
+  kernel.groups = static_cast<uint32_t>(spirv.groups);
+  kernel.set_layout = make_set_layout(gpu, op);
+  kernel.layout = make_layout(gpu, op, kernel.set_layout.get(), spirv.groups > 1);
+  kernel.pipeline = make_pipeline(gpu, op, spirv, kernel.layout.get(), cache);
+  return kernel;
+}
+
 }  // namespace
+
+const Kernel& Kernels::choose(Op op, const void* params) const {
+  const Forms& forms = forms_[static_cast<std::size_t>(op)];
+  return forms.lanes.pipeline.get() != VK_NULL_HANDLE && spirv_kernel(op, true).applies(params) ? forms.lanes
+                                                                                                : forms.any;
+}
+
+void Kernels::add(Kernel any, Kernel lanes) { forms_.push_back({std::move(any), std::move(lanes)}); }
 
 Kernels make_kernels(const Gpu& gpu, const PipelineCache& file) {
   const std::vector<unsigned char> kept = file.load();
   const Handle<VkPipelineCache> cache = make_cache(gpu, kept);
   Kernels kernels;
   for (const Op op : all_ops()) {
-    Kernel kernel;
-    kernel.set_layout = make_set_layout(gpu, op);
-    const SpirvKernel& spirv = spirv_kernel(op, gpu.processor());
-    kernel.groups = static_cast<uint32_t>(spirv.groups);
-    kernel.layout = make_layout(gpu, op, kernel.set_layout.get(), spirv.groups > 1);
-    kernel.pipeline = make_pipeline(gpu, op, spirv, kernel.layout.get(), cache.get());
-    kernels.push_back(std::move(kernel));
+    Kernel any = make_kernel(gpu, op, spirv_kernel(op, false), cache.get());
+    const SpirvKernel& lanes = spirv_kernel(op, true);
+    const bool wanted = gpu.processor() && lanes.words != nullptr;
+    kernels.add(std::move(any), wanted ? make_kernel(gpu, op, lanes, cache.get()) : Kernel());
   }
   if (!file.path().empty()) {
     const std::vector<unsigned char> data = data_of(gpu, cache.get());

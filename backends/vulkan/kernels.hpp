@@ -8,7 +8,7 @@
 
 namespace berth::vulkan {
 
-/// One operation, ready to be bound.
+/// One form of an operation, ready to be bound.
 struct Kernel {
   Handle<VkDescriptorSetLayout> set_layout;  // buffer i is binding i
   Handle<VkPipelineLayout> layout;           // that set, and the parameters as push constants
@@ -16,8 +16,20 @@ struct Kernel {
   uint32_t groups = 1;  // of kGroupSize items that a work-group runs; if several, how many there are follows the params
 };
 
-/// Every operation's kernel, by the number of the operation.
-using Kernels = std::vector<Kernel>;
+/// Every operation's kernels.
+class Kernels {
+ public:
+  /// The one to run with these parameters.
+  const Kernel& choose(Op op, const void* params) const;
+  void add(Kernel any, Kernel lanes);
+
+ private:
+  struct Forms {
+    Kernel any;
+    Kernel lanes;  // without a pipeline where there is none
+  };
+  std::vector<Forms> forms_;  // by the number of the operation
+};
 
 /// Makes them with what the file holds, and keeps there what it did not. Throws Error with the operation that the
 /// driver refuses.

@@ -35,7 +35,7 @@ VkPlan::VkPlan(const Gpu& gpu, const Kernels& kernels, const std::vector<Step>& 
     check_step(gpu, steps[i]);
     const uint32_t groups = static_cast<uint32_t>((steps[i].items - 1) / kGroupSize + 1);
     launches_.push_back(
-        {&kernels[static_cast<std::size_t>(steps[i].op)], VK_NULL_HANDLE, steps[i].params, groups, i, 0});
+        {&kernels.choose(steps[i].op, steps[i].params.data()), VK_NULL_HANDLE, steps[i].params, groups, i, 0});
   }
   if (!launches_.empty()) make_sets(steps);
   find_levels(steps);

@@ -1,7 +1,9 @@
 // The dialect as GLSL 4.50 for Vulkan: buffer i is binding i, parameters are push constants. One operation a shader.
 //   BERTH_NO_SHARED    for texts without SHARED: nothing to wait for
 //   BERTH_LANE_GROUPS  for processors: an invocation runs a whole group, item by item as in cpu.h. The lanes of a
-//                      vector are groups then, a phase of one item costs one turn, and no phase needs a barrier
+//                      vector are groups then, a phase of one item costs one turn, and no phase needs a barrier. An
+//                      invocation may make 65535 turns of loops in all (Mesa's llvmpipe leaves them then, silently):
+//                      only for texts that say LANES_IF, and while it holds
 #define GROUP_SIZE 128
 #define u32 uint
 #define s32 int
@@ -11,6 +13,8 @@
 #define IN(i, T, x) layout(std430, set = 0, binding = i) readonly buffer B##i { T x[]; };
 #define OUT(i, T, x) layout(std430, set = 0, binding = i) buffer B##i { T x[]; };
 #define INOUT(i, T, x) OUT(i, T, x)
+
+#define LANES_IF(condition)
 
 #ifdef BERTH_LANE_GROUPS
 #define KERNEL(name) layout(local_size_x = BERTH_LANE_GROUPS) in;

@@ -219,7 +219,7 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   stage("contour_collect", search.contours);
   run(contour_trace_params{g.max_contours}, {nodes, search.contours, points}, g.max_contours);
   stage("contour_trace", points, Stage::Length::points);
-  run(quad_fit_params{g.max_contours, kMinQuadSide}, {search.contours, points, search.quads},
+  run(quad_fit_params{g.max_contours, kMinQuadSide, g.width, height}, {search.contours, points, search.quads},
       g.max_contours * kGroupSize);
   stage("quad_fit", search.quads, Stage::Length::quads);
   run(edge_refine_params{search.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},
