@@ -8,13 +8,20 @@ PARAMS(contour_collect)
 LANES_IF(true)  // 128 items look through at most 15 rows
 SHARED(u32, ranks, 128)
 SHARED(u32, starts, 128)
+SHARED(u32, begins, 1)  // contours that the group begins
+SHARED(u32, needed, 1)  // contours in all
 BODY
+  FIRST_ITEMS(1) {
+    begins[0] = GROUP < p.groups ? spans[p.totals_at + GROUP + 1] - spans[p.totals_at + GROUP] : 0u;
+    needed[0] = spans[p.totals_at + p.groups];
+  }
+  BARRIER;
+  // Most groups begin no contour: nothing to number.
   EACH_ITEM
-    // Most groups begin no contour: nothing to number.
-    if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) ranks[LID] = spans[GID];
+    if (begins[0] != 0u) ranks[LID] = spans[GID];
   EACH_END
   FIRST_ITEMS(1) {
-    if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
+    if (begins[0] != 0u) {
       u32 rank = spans[p.totals_at + GROUP];
       u32 start = spans[p.totals_at + p.groups + 1 + GROUP];
       for (int i = 0; i < GROUP_SIZE; ++i) {
@@ -30,8 +37,7 @@ BODY
   }
   BARRIER;
   EACH_ITEM
-    const u32 needed = spans[p.totals_at + p.groups];
-    if (GROUP < p.groups && spans[p.totals_at + GROUP] != spans[p.totals_at + GROUP + 1]) {
+    if (begins[0] != 0u) {
       const u32 span = spans[GID];
       if (span != 0u && ranks[LID] < U32(p.max_contours)) {
         const u32 id = U32(GID) * 2u;
@@ -53,7 +59,7 @@ BODY
         contours[record + 3] = starts[LID];
       }
     }
-    if (GID >= S32(min(needed, U32(p.max_contours))) && GID < p.max_contours) {
+    if (GID < p.max_contours && GID >= S32(min(needed[0], U32(p.max_contours)))) {
       const int record = CONTOUR_HEADER + GID * CONTOUR_WORDS;
       contours[record] = 0u;
       contours[record + 1] = 0u;
@@ -62,7 +68,7 @@ BODY
     }
     if (GID == 0) {
       contours[0] = RUN_ENDS_BEFORE(p.height * p.row_words);
-      contours[1] = needed;
+      contours[1] = needed[0];
       contours[2] = spans[p.totals_at + p.groups + 1 + p.groups];
     }
   EACH_END

@@ -19,7 +19,7 @@ BODY
     contours[0] = 0u;
     points[0] = 0u;
     // Nodes exist for whole rows within the capacity: all of them, or the last row's begin that does not pass it.
-    int low = 0;
+    int low = RUN_ENDS_BEFORE(p.height * p.row_words) <= U32(p.capacity) ? p.height : 0;
     int high = p.height + 1;
     while (high - low > 1) {
       const int middle = (low + high) / 2;
@@ -39,7 +39,7 @@ BODY
       const int top = node_step(nodes[first]);  // 1: of an outline, -1: of a hole
       if ((top == 1 && p.want_outer != 0) || (top == -1 && p.want_holes != 0)) {
         const int first_x = node_x(nodes[first]);
-        const int most_nodes = p.max_side * 5 / 2 + 4;
+        const int most_nodes = min(p.max_side, p.height) * 5 / 2 + 4;
         int id = first;
         int y = 0;
         int count = 0;

@@ -27,7 +27,7 @@ HWY_INLINE int node_descent(int id, int step) { return (step & 1) != 0 ? 0 : (id
 /// The contour that begins with the top `first`: its number of nodes, or 0 when it is none of ours.
 /// `seen`: nodes of contours of this kind of top that were walked over before.
 HWY_INLINE u32 walk(const contour_measure_params& p, const u32* nodes, int first, int top, u8* seen) {
-  const int most_nodes = p.max_side * 5 / 2 + 4;
+  const int most_nodes = std::min(p.max_side, p.height) * 5 / 2 + 4;
   const int first_x = node_x(nodes[first]);
   int id = first;
   int y = 0;
