@@ -15,6 +15,7 @@ namespace berth::cuda {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -153,7 +154,7 @@ TEST_P(CudaFailure, OfAnyCallAtStartIsAnErrorAndLeavesNothing) {
   for (const auto& [function, count] : called) {
     for (int nth = 1; nth <= count; nth += 1 + count / 7) {
       for (const bool lasting : {false, true}) {
-        // A context is either there or lost for good; and a detector's first run may fail without a word.
+        // A context is either there or lost for good.
         if (function == "cuCtxPushCurrent_v2" && !lasting) continue;
         driver.fake_cuda_reset();
         driver.fake_cuda_fail(function.c_str(), nth, kUnknownError, lasting);
@@ -162,7 +163,9 @@ TEST_P(CudaFailure, OfAnyCallAtStartIsAnErrorAndLeavesNothing) {
         expect_clean(where);
         if (error == "no error") continue;
         ++failed;
-        EXPECT_THAT(error, AllOf(StartsWith("cuda: "), HasSubstr("999"))) << where;
+        // In the detector's first, empty frame nobody hears the driver's number.
+        EXPECT_THAT(error, AllOf(StartsWith("cuda: "), AnyOf(HasSubstr("999"), HasSubstr("first, empty frame"))))
+            << where;
       }
     }
     // The first call of all must succeed for a start to succeed, but for those of a frame.
