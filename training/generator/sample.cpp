@@ -193,10 +193,10 @@ class Studio::Shot {
       pose.t = at(x, y, depth);
       scene_.place(thing, pose, scale, Owner::other);
     }
-    if (far_ || !random_.chance(0.35)) return;
+    if (far_ || !random_.chance(0.5)) return;
     const double depth = std::max(0.3, depth_m_ * random_.uniform(0.4, 0.75));
     if (depth > depth_m_ - 0.25) return;
-    const double angle = random_.uniform(0, 2 * sim::kPi), off = d_px_ * random_.uniform(0.1, 0.5);
+    const double angle = random_.uniform(0, 2 * sim::kPi), off = d_px_ * random_.uniform(0, 0.4);
     Pose pose;
     pose.R = turned(0.4, 0.4, sim::kPi);
     pose.t = at(label_.x + off * sim::exact_cos(angle), label_.y + off * sim::exact_sin(angle), depth);

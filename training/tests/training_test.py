@@ -1,0 +1,162 @@
+"""Tests of the training code; needs torch. Run: python3 -m unittest discover -s training/tests -p '*_test.py'"""
+import csv
+import json
+import pathlib
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+import torch
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import curves  # noqa: E402
+from batches import BATCH, Samples, augmented, normalised, shifted, training_batch  # noqa: E402
+from model import LocalResponseNorm, Network, size_of  # noqa: E402
+from navset import NavSet  # noqa: E402
+from train import LOG, Trainer, run  # noqa: E402
+
+
+def small_set(folder, count=120):
+    """Bright squares on noise are `targets`: a set in berth_navset's form that a network can learn at once."""
+    random = np.random.default_rng(3)
+    images = random.integers(20, 90, (count, 256, 256), dtype=np.uint8)
+    header = "index,part,class,subject,visible,d_px,x,y,x0,y0,x1,y1,full_x0,full_y0,full_x1,full_y1,light,background,livery"
+    lines = [header]
+    for i in range(count):
+        present = i % 2
+        x, y, d = random.integers(100, 156), random.integers(100, 156), random.integers(40, 90)
+        if present:
+            images[i, y - d // 2:y + d // 2, x - d // 2:x + d // 2] = 220
+        values = [present, d, x, y] if present else [0, 0, 0, 0]
+        lines.append(f"{i},{'train' if i < count * 3 // 4 else 'test'},{values[0]},thing,1,{values[1]},{values[2]},{values[3]}"
+                     + ",0" * 8 + ",lamps,b,l")
+    images.tofile(folder / "images.u8")
+    (folder / "labels.csv").write_text("\n".join(lines) + "\n")
+    (folder / "manifest.json").write_text(json.dumps({"set": "small"}))
+    return NavSet(folder)
+
+
+SETTINGS = {"network": "lite", "seed": 5, "learning_rate": 1e-3, "weight_decay": 0.02, "dropout": 0.2, "augment": True,
+            "normalise": True, "precision": "fp32", "iterations": 20}
+
+
+class Networks(unittest.TestCase):
+    def test_have_the_sizes_of_the_specification(self):
+        for name, parameters, macs in (("paper", 56.9e6, 766e6), ("lite", 1.07e6, 102e6)):
+            got = size_of(Network(name))
+            self.assertLess(abs(got[0] / parameters - 1), 0.005, name)
+            self.assertLess(abs(got[1] / macs - 1), 0.005, name)
+
+    def test_local_response_norm_is_torchs_with_its_gradient(self):
+        torch.manual_seed(1)
+        ours, theirs = LocalResponseNorm(0.3), torch.nn.LocalResponseNorm(5, 0.3, 0.75, 1.0)
+        x = torch.randn(2, 9, 4, 4, dtype=torch.double)
+        a, b, gradient = x.clone().requires_grad_(), x.clone().requires_grad_(), torch.randn_like(x)
+        ours(a).backward(gradient)
+        theirs(b).backward(gradient)
+        torch.testing.assert_close(ours(x), theirs(x))
+        torch.testing.assert_close(a.grad, b.grad)
+
+    def test_folding_changes_nothing(self):
+        torch.manual_seed(2)
+        network = Network("lite").train()
+        for _ in range(3):
+            network(torch.randn(4, 1, 256, 256) * 2 + 1)
+        network.eval()
+        folded = network.folded()
+        self.assertFalse(any("norms" in name for name in folded.state_dict()))
+        x = torch.randn(3, 1, 256, 256)
+        for a, b in zip(network(x), folded(x)):
+            torch.testing.assert_close(a, b, atol=1e-4, rtol=1e-3)
+
+
+class Batches(unittest.TestCase):
+    def test_an_epoch_shows_every_image_in_192_batches_of_the_papers_set(self):
+        seen = np.concatenate([training_batch(1, i, 9590) for i in range(192)])
+        self.assertEqual(len(seen), 192 * BATCH)
+        self.assertEqual(len(np.unique(seen)), 9590)
+        self.assertFalse(np.array_equal(training_batch(1, 0, 9590), training_batch(1, 192, 9590)))
+
+    def test_normalisation_is_the_integer_formula_pixel_by_pixel(self):
+        random = np.random.default_rng(0)
+        image = random.integers(40, 60, (1, 256, 256), dtype=np.uint8)
+        image[0, 0, 0] = 255
+        x = image.astype(object)
+        m = (int(x.sum()) + 2**15) >> 16
+        v = (int((x * x).sum()) >> 16) - m * m
+        s = int(v**0.5)
+        gain = (256 * 48 + s // 2) // s
+        expected = np.clip(((x - m) * gain + 128) >> 8, -128, 127).astype(np.int8)
+        np.testing.assert_array_equal(normalised(image), expected)
+        self.assertEqual(normalised(np.full((1, 256, 256), 7, np.uint8)).max(), 0)
+
+    def test_augmentation_moves_the_centre_with_the_picture(self):
+        images = np.zeros((40, 256, 256), np.uint8)
+        x, y = np.full(40, 150, np.float32), np.full(40, 110, np.float32)
+        images[:, 110, 150] = 200
+        moved, new_x, new_y, _ = augmented(1, 7, images, x, y, x)
+        for image, column, row in zip(moved, new_x, new_y):
+            self.assertEqual(np.unravel_index(image.argmax(), image.shape), (row, column))
+        self.assertGreater(len({(a, b) for a, b in zip(new_x, new_y)}), 20)
+        again = augmented(1, 7, images, x, y, x)[0]
+        np.testing.assert_array_equal(moved, again)
+
+    def test_a_shift_repeats_the_rim(self):
+        image = np.arange(256, dtype=np.uint8)[None, :].repeat(256, 0)
+        self.assertEqual(shifted(image, 3, 0)[0, :5].tolist(), [0, 0, 0, 0, 1])
+        self.assertEqual(shifted(image, -3, 0)[0, -4:].tolist(), [255, 255, 255, 255])
+
+
+class Runs(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.temporary.name)
+        navset = small_set(self.folder)
+        self.train, self.test = Samples([navset], "train"), Samples([navset], "test")
+        torch.set_num_threads(1)
+        torch.use_deterministic_algorithms(True)
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def trainer(self, **changes):
+        return Trainer({**SETTINGS, **changes}, self.train, self.test, "cpu")
+
+    def run_in(self, name, trainer, until):
+        folder = self.folder / name
+        folder.mkdir(exist_ok=True)
+        run(trainer, folder, until, log_every=2, test_every=4, snapshot_every=4, latest_every=3)
+        return folder
+
+    def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(self):
+        whole, first, second = self.trainer(), self.trainer(), self.trainer()
+        self.run_in("whole", whole, 8)
+        folder = self.run_in("parts", first, 5)
+        second.restore(torch.load(folder / "latest.pt", weights_only=True))
+        self.run_in("parts", second, 8)
+        for (name, a), b in zip(whole.network.state_dict().items(), second.network.state_dict().values()):
+            self.assertTrue(torch.equal(a, b), name)
+        logs = []
+        for name in ("whole", "parts"):
+            with open(self.folder / name / "log.csv", newline="") as file:
+                # Means over the batches since the last row start afresh at a resumption; the rest must agree.
+                logs.append([{k: v for k, v in row.items() if k not in ("seconds", "train_loss", "train_accuracy")}
+                             for row in csv.DictReader(file)])
+        self.assertEqual(logs[0], logs[1])
+        self.assertTrue((folder / "snapshot-000008.pt").exists())
+
+    def test_learns_what_is_easy_and_draws_its_curves(self):
+        trainer = self.trainer(iterations=40, augment=False, dropout=0.0)
+        folder = self.run_in("easy", trainer, 40)
+        with open(folder / "log.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(list(rows[0]), LOG)
+        self.assertLess(float(rows[-1]["train_loss"]), 0.5 * float(rows[0]["train_loss"]))
+        self.assertGreaterEqual(float(rows[-1]["test_accuracy"]), 0.9)
+        picture = curves.svg(rows, "easy")
+        self.assertEqual(picture.count("<polyline"), 4)
+
+
+if __name__ == "__main__":
+    unittest.main()
