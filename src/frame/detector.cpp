@@ -208,7 +208,7 @@ struct Detector::Impl {
   bool is_known(const QuadCandidate& candidate) const {
     for (const Detection& known : result.detections) {
       const double side = std::sqrt(square_distance(known.corners[0], known.corners[1]));
-      if (same_corners(candidate.fine, known.corners, std::min(2.0, std::max(1.0, side / 10)))) return true;
+      if (same_corners(candidate.fine, known.corners, std::max(1.0, side / 10))) return true;
     }
     for (const Corners& known : refused) {
       if (same_corners(candidate.fine, known, 0.25)) return true;
