@@ -58,7 +58,7 @@ void Gallery::read_photos(const std::string& folder) {
     if (!(words >> file >> source)) continue;
     const bool held_out = sim::scatter(hash_bytes(source.data(), source.size())) % 10 < 3;
     entries_.push_back({BackdropKind::photo, file.substr(0, file.rfind('.')), held_out,
-                        std::make_unique<std::once_flag>(), read_pgm(folder + "/" + file)});
+                        std::make_unique<std::once_flag>(), read_pgm(std::string(folder).append("/").append(file))});
     const View2D<const u8> image = entries_.back().image.view();
     photo_hash_ = hash_bytes(image.data, static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
                              photo_hash_);

@@ -152,7 +152,8 @@ Model rover(Random& random) {
   Model model{box({0.13, 0.04, 0.08}, {0, 0, 0}, hull), cylinder(0.008, 0.07, {0.08, -0.1, 0}, metal(0.5), kAlongY),
               box({0.03, 0.018, 0.02}, {0.08, -0.18, 0}, plain(0.2, 0.4))};
   for (int i = 0; i < 6; ++i) {
-    const double x = 0.1 * (i / 2 - 1), z = (i & 1) != 0 ? 0.1 : -0.1;
+    const int axle = i / 2 - 1;
+    const double x = 0.1 * axle, z = (i & 1) != 0 ? 0.1 : -0.1;
     model.push_back(cylinder(0.038, 0.02, {x, 0.055, z}, plain(0.06), kAlongZ));
   }
   if (random.chance(0.5)) model.push_back(box({0.1, 0.002, 0.07}, {-0.03, -0.06, 0}, solar_cells(0.1, 0.5, 0.03, 3)));

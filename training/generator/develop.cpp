@@ -58,7 +58,7 @@ class ToneCurve {
 double metered(const std::vector<double>& radiance) {
   constexpr int kBins = 1024;
   std::vector<long> counts(kBins + 1, 0);
-  for (const double value : radiance) ++counts[static_cast<std::size_t>(std::min(2.0, value) * (kBins / 2))];
+  for (const double value : radiance) ++counts[static_cast<std::size_t>(std::min(2.0, value) * (0.5 * kBins))];
   const auto total = static_cast<long>(radiance.size());
   double sum = 0;
   for (const long share : {total / 10, total / 100}) {

@@ -31,7 +31,8 @@ std::vector<std::string> mesh_files(const std::string& folder) {
   if (directory == nullptr) throw Error("cannot read " + folder);
   while (const dirent* entry = readdir(directory)) {
     const std::string name = entry->d_name;
-    if (name.size() > 4 && name.substr(name.size() - 4) == ".3ds") files.push_back(folder + "/" + name);
+    if (name.size() > 4 && name.substr(name.size() - 4) == ".3ds")
+      files.push_back(std::string(folder).append("/").append(name));
   }
   closedir(directory);
   std::sort(files.begin(), files.end());

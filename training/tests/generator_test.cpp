@@ -1,5 +1,7 @@
+#include <dirent.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -16,11 +18,27 @@
 namespace berth::navset {
 namespace {
 
-std::string new_folder() {
-  std::string path = ::testing::TempDir() + "navset-XXXXXX";
-  if (mkdtemp(path.data()) == nullptr) throw Error("no temporary folder");
-  return path;
-}
+// A folder that goes away, with the flat files in it, at the end of the test.
+class NewFolder {
+ public:
+  NewFolder() : path_(::testing::TempDir() + "navset-XXXXXX") {
+    if (mkdtemp(path_.data()) == nullptr) throw Error("no temporary folder");
+  }
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+  ~NewFolder() {
+    if (DIR* directory = opendir(path_.c_str())) {
+      while (const dirent* entry = readdir(directory)) std::remove((path_ + "/" + entry->d_name).c_str());
+      closedir(directory);
+    }
+    rmdir(path_.c_str());
+  }
+  operator const std::string&() const { return path_; }
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
 
 std::string content(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -67,22 +85,22 @@ class Generator : public ::testing::Test {
 
 TEST_F(Generator, WritesTheSameBytesForAnyNumberOfThreads) {
   const SetPlan plan = small("paper-split", 28, 12);
-  const std::string one = new_folder();
+  const NewFolder one;
   const SetResult expected = write(plan, 1, one);
   for (const int threads : {2, 5}) {
-    const std::string folder = new_folder();
+    const NewFolder folder;
     const SetResult result = write(plan, threads, folder);
     EXPECT_EQ(result.image_hash, expected.image_hash) << threads << " threads";
     EXPECT_EQ(result.label_hash, expected.label_hash) << threads << " threads";
-    EXPECT_TRUE(content(folder + "/images.u8") == content(one + "/images.u8")) << threads << " threads";
+    EXPECT_TRUE(content(folder / "images.u8") == content(one / "images.u8")) << threads << " threads";
   }
-  const std::string pixels = content(one + "/images.u8"), labels = content(one + "/labels.csv");
+  const std::string pixels = content(one / "images.u8"), labels = content(one / "labels.csv");
   EXPECT_EQ(pixels.size(), 40u * 256 * 256);
   EXPECT_EQ(hash_bytes(pixels.data(), pixels.size()), expected.image_hash);
   EXPECT_EQ(hash_bytes(labels.data(), labels.size()), expected.label_hash);
   SetPlan other = plan;
   other.seed = 2;
-  EXPECT_NE(write(other, 2, new_folder()).image_hash, expected.image_hash);
+  EXPECT_NE(write(other, 2, NewFolder()).image_hash, expected.image_hash);
 }
 
 // hashes.txt, a line "NAME seed N TRAIN+TEST photographs N meshes N images HASH labels HASH" a set.
@@ -102,7 +120,7 @@ TEST_F(Generator, WritesTheCommittedHashOfEachSmallSet) {
     }
     ASSERT_EQ(std::sscanf(size.c_str(), "%d+%d", &plan.train, &plan.test), 2) << text;
     if (plan.count() > 100 || photographs != 0 || meshes != 0) continue;
-    const SetResult result = write(plan, 2, new_folder());
+    const SetResult result = write(plan, 2, NewFolder());
     EXPECT_EQ(result.image_hash, std::stoull(images, nullptr, 16)) << text;
     EXPECT_EQ(result.label_hash, std::stoull(labels, nullptr, 16)) << text;
     ++checked;
@@ -111,7 +129,7 @@ TEST_F(Generator, WritesTheCommittedHashOfEachSmallSet) {
 }
 
 TEST_F(Generator, LabelsAgreeWithTheCamera) {
-  const std::string folder = new_folder();
+  const NewFolder folder;
   const SetPlan plan = small("paper-split", 100, 0);
   write(plan, 2, folder);
   const auto all = rows(folder);
@@ -151,7 +169,7 @@ TEST_F(Generator, LabelsAgreeWithTheCamera) {
 }
 
 TEST_F(Generator, KeepsTheTestsBackgroundsAndLiveriesOutOfDisjointTraining) {
-  const std::string folder = new_folder();
+  const NewFolder folder;
   write(small("disjoint", 60, 40), 2, folder);
   std::set<std::string> seen[2];
   for (const auto& row : rows(folder)) {
@@ -198,12 +216,11 @@ TEST(Gallery, HasAThousandBackgroundsAndHoldsSomeOfEachKindOut) {
 }
 
 TEST(Gallery, ReadsPhotographsAndKeepsOnesCropsTogether) {
-  const std::string folder = new_folder();
-  std::ofstream index(folder + "/index.txt");
+  const NewFolder folder;
+  std::ofstream index(folder / "index.txt");
   for (int i = 0; i < 40; ++i) {
     const std::string name = "photo-" + std::to_string(i) + ".pgm";
-    std::ofstream(folder + "/" + name, std::ios::binary) << "P5\n64 64\n255\n"
-                                                         << std::string(64 * 64, static_cast<char>(i));
+    std::ofstream(folder / name, std::ios::binary) << "P5\n64 64\n255\n" << std::string(64 * 64, static_cast<char>(i));
     index << name << " source-" << i / 4 << "\n";
   }
   index.close();
@@ -218,7 +235,7 @@ TEST(Gallery, ReadsPhotographsAndKeepsOnesCropsTogether) {
   }
   EXPECT_GT(held, 0);
   EXPECT_LT(held, 40);
-  std::ofstream(folder + "/photo-3.pgm", std::ios::binary) << "P5\n64 64\n255\nshort";
+  std::ofstream(folder / "photo-3.pgm", std::ios::binary) << "P5\n64 64\n255\nshort";
   EXPECT_THROW(Gallery{folder}, Error);
 }
 

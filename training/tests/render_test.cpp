@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
-#include <cstring>
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
 
 #include "berth/error.hpp"
@@ -100,7 +102,8 @@ TEST(Target, HasItsFarthestPointsOnTheCircumscribedSphere) {
       const double r = std::max(s[0], s[1]);
       for (int i = 0; i < 64; ++i) {
         // A box's corners; points round a frustum's ends.
-        const double a = 2 * sim::kPi * (i / 2) / 32, end = (i & 1) != 0 ? s[2] : -s[2];
+        const int step = i / 2;
+        const double a = 2 * sim::kPi * step / 32, end = (i & 1) != 0 ? s[2] : -s[2];
         const Vec3 local = round ? Vec3{r * sim::exact_cos(a), r * sim::exact_sin(a), end}
                                  : Vec3{(i & 2) != 0 ? s[0] : -s[0], (i & 4) != 0 ? s[1] : -s[1], end};
         farthest = std::max(farthest, sim::length(sim::transform(part.pose, local)));
@@ -137,14 +140,21 @@ std::string square_3ds(int last_corner = 3) {
   return chunk(0x4d4d, chunk(0x3d3d, chunk(0x4000, std::string("square\0", 7) + mesh)));
 }
 
-std::string written(const std::string& bytes) {
-  const std::string path = ::testing::TempDir() + "square.3ds";
+std::vector<Mesh::Triangle> read_bytes(const std::string& bytes) {
+  std::string path = ::testing::TempDir() + "mesh-XXXXXX";
+  const int file = mkstemp(path.data());
+  if (file < 0) throw std::runtime_error("no temporary file");
+  close(file);
   std::ofstream(path, std::ios::binary) << bytes;
-  return path;
+  struct Remover {
+    const std::string& path;
+    ~Remover() { std::remove(path.c_str()); }
+  } remover{path};
+  return read_3ds(path);
 }
 
 TEST(Mesh, IsReadCentredAndHit) {
-  const std::vector<Mesh::Triangle> triangles = read_3ds(written(square_3ds()));
+  const std::vector<Mesh::Triangle> triangles = read_bytes(square_3ds());
   ASSERT_EQ(triangles.size(), 2u);
   const Mesh mesh(triangles);
   Shape square = shape(ShapeKind::mesh, {2, 0, 0});
@@ -157,10 +167,10 @@ TEST(Mesh, IsReadCentredAndHit) {
 TEST(Mesh, BadFilesAreRefused) {
   const std::string good = square_3ds();
   EXPECT_THROW(read_3ds("/no/such/file.3ds"), Error);
-  EXPECT_THROW(read_3ds(written("P5 no mesh")), Error);
-  EXPECT_THROW(read_3ds(written(square_3ds(4))), Error);
+  EXPECT_THROW(read_bytes("P5 no mesh"), Error);
+  EXPECT_THROW(read_bytes(square_3ds(4)), Error);
   for (std::size_t length = 0; length < good.size(); ++length) {
-    EXPECT_THROW(read_3ds(written(good.substr(0, length))), Error) << length;
+    EXPECT_THROW(read_bytes(good.substr(0, length)), Error) << length;
   }
   EXPECT_THROW(Mesh({}), Error);
   EXPECT_THROW(Mesh({{Vec3{1, 1, 1}, Vec3{1, 1, 1}, Vec3{1, 1, 1}}}), Error);
