@@ -17,9 +17,8 @@ BODY
   }
   BARRIER;
   // Most groups begin no contour: nothing to number.
-  EACH_ITEM
-    if (begins[0] != 0u) ranks[LID] = spans[GID];
-  EACH_END
+  FIRST_ITEMS(begins[0] != 0u ? GROUP_SIZE : 0) ranks[LID] = spans[GID];
+  BARRIER;
   FIRST_ITEMS(1) {
     if (begins[0] != 0u) {
       u32 rank = spans[p.totals_at + GROUP];
@@ -36,40 +35,42 @@ BODY
     }
   }
   BARRIER;
-  EACH_ITEM
-    if (begins[0] != 0u) {
-      const u32 span = spans[GID];
-      if (span != 0u && ranks[LID] < U32(p.max_contours)) {
-        const u32 id = U32(GID) * 2u;
-        int low = 0;  // the row whose run ends hold id
-        int high = p.height;
-        while (high - low > 1) {
-          const int middle = (low + high) / 2;
-          if (RUN_ENDS_BEFORE(middle * p.row_words) <= id) {
-            low = middle;
-          } else {
-            high = middle;
-          }
+  FIRST_ITEMS(begins[0] != 0u ? GROUP_SIZE : 0) {
+    const u32 span = spans[GID];
+    if (span != 0u && ranks[LID] < U32(p.max_contours)) {
+      const u32 id = U32(GID) * 2u;
+      int low = 0;  // the row whose run ends hold id
+      int high = p.height;
+      while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (RUN_ENDS_BEFORE(middle * p.row_words) <= id) {
+          low = middle;
+        } else {
+          high = middle;
         }
-        const bool fits = starts[LID] + (span & ~CONTOUR_HOLE) <= U32(p.max_points);
-        const int record = CONTOUR_HEADER + S32(ranks[LID]) * CONTOUR_WORDS;
-        contours[record] = id;
-        contours[record + 1] = fits ? span : 0u;
-        contours[record + 2] = U32(low);
-        contours[record + 3] = starts[LID];
       }
+      const bool fits = starts[LID] + (span & ~CONTOUR_HOLE) <= U32(p.max_points);
+      const int record = CONTOUR_HEADER + S32(ranks[LID]) * CONTOUR_WORDS;
+      contours[record] = id;
+      contours[record + 1] = fits ? span : 0u;
+      contours[record + 2] = U32(low);
+      contours[record + 3] = starts[LID];
     }
-    if (GID < p.max_contours && GID >= S32(min(needed[0], U32(p.max_contours)))) {
+  }
+  FIRST_ITEMS(min(p.max_contours - GROUP * GROUP_SIZE, GROUP_SIZE)) {
+    if (GID >= S32(min(needed[0], U32(p.max_contours)))) {
       const int record = CONTOUR_HEADER + GID * CONTOUR_WORDS;
       contours[record] = 0u;
       contours[record + 1] = 0u;
       contours[record + 2] = 0u;
       contours[record + 3] = 0u;
     }
-    if (GID == 0) {
+  }
+  FIRST_ITEMS(1) {
+    if (GROUP == 0) {
       contours[0] = RUN_ENDS_BEFORE(p.height * p.row_words);
       contours[1] = needed[0];
       contours[2] = spans[p.totals_at + p.groups + 1 + p.groups];
     }
-  EACH_END
+  }
 END

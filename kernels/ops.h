@@ -1,4 +1,4 @@
-/* Every device operation and its parameters. Read by C++, OpenCL C, CUDA and GLSL: plain structs of ints, 128 bytes at
+/* Every device operation and its parameters. Read by C++, OpenCL C, CUDA and GLSL: plain structs of ints, 124 bytes at
    most. Buffers, their order and their element types are those of the reference's signature, src/reference/<op>.cpp.
 
    Layouts shared by the marker operations

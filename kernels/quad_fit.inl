@@ -57,6 +57,7 @@ IN(1, u32, points)
 OUT(2, s32, quads)  // [max_contours, QUAD_WORDS]: see ops.h; only the flags are written where there is none
 PARAMS(quad_fit)
 LANES_IF(p.max_height * 70 + p.max_width * 20 < 47000)  // at most 28 turns a node, 8 a column, 17500 besides
+STRIDE_IF(p.max_height * 10 + p.max_width * 3 < 47000)  // an eighth of those turns a node and a column
 SHARED(int, state, STATE_WORDS)
 SHARED(int, work, 640)  // five words an item, or two
 SHARED(int, sums, 20)

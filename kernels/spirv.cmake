@@ -1,40 +1,47 @@
 # The kernel text as SPIR-V, for Vulkan.
 #
 # berth_embed_spirv(OUT): sets OUT to a generated source that defines spirv_kernel() of spirv_kernels.hpp. Each
-# operation of ops.h becomes a shader of its own, and another for processors where its text says LANES_IF (see
-# prelude/glsl.h), compiled by glslangValidator and checked by spirv-val.
+# operation of ops.h becomes a shader of its own, and another for processors where its text says LANES_IF, and
+# where it says STRIDE_IF (see prelude/glsl.h), compiled by glslangValidator and checked by spirv-val.
 #
 # Run as a script (cmake -DKERNELS=… -DMODULES=a.spv;b.lanes.spv;b.spv -DLANES=8 -DOUT=… -P spirv.cmake) it writes that source.
 if(CMAKE_SCRIPT_MODE_FILE)
   set(source "// Generated from kernels/ by kernels/spirv.cmake.\n#include \"spirv_kernels.hpp\"\n\nnamespace berth {\n")
-  string(APPEND source "namespace {\n\n")
+  string(APPEND source "namespace {\n\nconst SpirvKernel none = {nullptr, 0, 0, nullptr};\n")
   set(ops "")
   foreach(module IN LISTS MODULES)
     get_filename_component(op ${module} NAME_WE)
     file(READ ${module} bytes HEX)
     string(REGEX REPLACE "(..)(..)(..)(..)" "0x\\4\\3\\2\\1u," words "${bytes}")
-    if(module MATCHES "\\.lanes\\.spv$")
-      file(STRINGS ${KERNELS}/${op}.inl condition REGEX "^LANES_IF\\(")
-      string(REGEX REPLACE "^LANES_IF\\((.*)\\).*" "\\1" condition "${condition}")
-      string(APPEND source "const u32 ${op}_lanes[] = {${words}};\n"
-                           "bool ${op}_lanes_if(const void* params) {\n"
+    if(module MATCHES "\\.(lanes|stride)\\.spv$")
+      set(form ${CMAKE_MATCH_1})
+      string(TOUPPER ${form}_IF word)
+      file(STRINGS ${KERNELS}/${op}.inl condition REGEX "^${word}\\(")
+      string(REGEX REPLACE "^${word}\\((.*)\\).*" "\\1" condition "${condition}")
+      set(groups 1)
+      if(form STREQUAL "lanes")
+        set(groups ${LANES})
+      endif()
+      string(APPEND source "const u32 ${op}_${form}[] = {${words}};\n"
+                           "bool ${op}_${form}_if(const void* params) {\n"
                            "  [[maybe_unused]] const auto& p = *static_cast<const ${op}_params*>(params);\n"
                            "  return ${condition};\n}\n")
-      set(lanes_of_${op} "{${op}_lanes, sizeof ${op}_lanes, ${LANES}, &${op}_lanes_if}")
+      set(${form}_${op} "{${op}_${form}, sizeof ${op}_${form}, ${groups}, &${op}_${form}_if}")
     else()
       string(APPEND source "const u32 ${op}[] = {${words}};\n")
-      set(lanes_of_${op} "{nullptr, 0, 0, nullptr}")
+      set(any_${op} "{${op}, sizeof ${op}, 1, nullptr}")
+      set(lanes_${op} none)
+      set(stride_${op} none)
       list(APPEND ops ${op})
     endif()
   endforeach()
   set(table "")
   foreach(op IN LISTS ops)
-    string(APPEND table "  case Op::${op}: {\n    static const SpirvKernel kernels[] = {{${op}, sizeof ${op}, 1, nullptr}, "
-                        "${lanes_of_${op}}};\n    return kernels[lanes ? 1 : 0];\n  }\n")
+    string(APPEND table "  case Op::${op}: {\n    static const SpirvKernel forms[] = {${any_${op}}, ${lanes_${op}}, "
+                        "${stride_${op}}};\n    return forms[static_cast<int>(form)];\n  }\n")
   endforeach()
-  string(APPEND source "const SpirvKernel none = {nullptr, 0, 0, nullptr};\n\n}  // namespace\n\n"
-                       "const SpirvKernel& spirv_kernel(Op op, bool lanes) {\n  switch (op) {\n${table}  }\n"
-                       "  return none;\n}\n\n}  // namespace berth\n")
+  string(APPEND source "\n}  // namespace\n\nconst SpirvKernel& spirv_kernel(Op op, SpirvForm form) {\n  switch (op) {\n"
+                       "${table}  }\n  return none;\n}\n\n}  // namespace berth\n")
   file(WRITE ${OUT} "${source}")
   return()
 endif()
@@ -68,15 +75,20 @@ function(berth_embed_spirv out)
 ")
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/${op}.inl)
     file(STRINGS ${BERTH_KERNELS_DIR}/${op}.inl shared REGEX "^SHARED\\(")
-    file(STRINGS ${BERTH_KERNELS_DIR}/${op}.inl lanes_if REGEX "^LANES_IF\\(")
     set(variants ${op})
-    if(lanes_if)
-      list(APPEND variants ${op}.lanes)
-    endif()
+    foreach(form lanes stride)
+      string(TOUPPER ${form}_IF word)
+      file(STRINGS ${BERTH_KERNELS_DIR}/${op}.inl condition REGEX "^${word}\\(")
+      if(condition)
+        list(APPEND variants ${op}.${form})
+      endif()
+    endforeach()
     foreach(variant IN LISTS variants)
       set(definition "")
       if(variant MATCHES "lanes$")
         set(definition -DBERTH_LANE_GROUPS=${lanes})
+      elseif(variant MATCHES "stride$")
+        set(definition -DBERTH_STRIDE=${lanes})
       elseif(NOT shared)
         set(definition -DBERTH_NO_SHARED)
       endif()

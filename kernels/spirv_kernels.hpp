@@ -11,14 +11,18 @@ namespace berth {
 struct SpirvKernel {
   const u32* words;
   std::size_t bytes;
-  /// Groups of kGroupSize items that a Vulkan work-group runs: one, with an invocation an item; or several, with an
-  /// invocation a group, and the number of groups follows the parameters as one more int.
+  /// Groups of kGroupSize items that a Vulkan work-group runs. How many there are follows the parameters as one more
+  /// int.
   int groups;
-  /// Whether several may be run with these parameters; null where one is. See prelude/glsl.h.
+  /// Whether it may run with these parameters; null where it always may.
   bool (*applies)(const void* params);
 };
 
-/// The kernel for every device; or the one for the lanes of a processor, without words where there is none.
-const SpirvKernel& spirv_kernel(Op op, bool lanes);
+/// For every device; or for the vectors of a processor: a group a lane, or a group a vector. See prelude/glsl.h.
+enum class SpirvForm { any, lanes, stride };
+constexpr SpirvForm kSpirvForms[] = {SpirvForm::any, SpirvForm::lanes, SpirvForm::stride};
+
+/// Without words where the operation does not have that form.
+const SpirvKernel& spirv_kernel(Op op, SpirvForm form);
 
 }  // namespace berth

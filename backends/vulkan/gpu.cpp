@@ -1,6 +1,7 @@
 #include "vulkan/gpu.hpp"
 
 #include <algorithm>
+#include <thread>
 
 #include "berth/error.hpp"
 
@@ -75,6 +76,7 @@ Gpu::Gpu(const BackendOptions& options, const Instruments& instruments) : Gpu(in
   api_.vkGetPhysicalDeviceMemoryProperties(device_.physical, &memory_);
   if (options.baseline_only) return;
   processor_ = device_.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  if (processor_) rows_ = std::max(1u, std::thread::hardware_concurrency());
   unified_ = (processor_ || device_.type == VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU) &&
              memory_type(memory_, ~0u, kShared) != kNone;
 }

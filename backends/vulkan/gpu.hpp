@@ -25,6 +25,8 @@ class Gpu {
   bool unified() const { return unified_; }
   /// Whether it is a processor that runs the kernels with its vector units.
   bool processor() const { return processor_; }
+  /// Rows of a grid of work-groups: one a thread of a processor, else one. See kernels/prelude/glsl.h.
+  uint32_t rows() const { return rows_; }
 
   /// Submits from any thread.
   VkResult submit(const VkSubmitInfo& info, VkFence fence) const;
@@ -46,6 +48,7 @@ class Gpu {
   VkPhysicalDeviceMemoryProperties memory_ = {};
   bool unified_ = false;
   bool processor_ = false;
+  uint32_t rows_ = 1;
 };
 
 /// A buffer with memory of its own.

@@ -1,7 +1,5 @@
 #include "vulkan/kernels.hpp"
 
-#include "spirv_kernels.hpp"
-
 namespace berth::vulkan {
 namespace {
 
@@ -43,10 +41,10 @@ Handle<VkDescriptorSetLayout> make_set_layout(const Gpu& gpu, Op op) {
   return {gpu.get(), layout, gpu.api().vkDestroyDescriptorSetLayout};
 }
 
-Handle<VkPipelineLayout> make_layout(const Gpu& gpu, Op op, VkDescriptorSetLayout set_layout, bool counts_groups) {
+Handle<VkPipelineLayout> make_layout(const Gpu& gpu, Op op, VkDescriptorSetLayout set_layout) {
   VkPushConstantRange params = {};
   params.stageFlags = VK_SHADER_STAGE_COMPUTE_BIT;
-  params.size = static_cast<uint32_t>(param_bytes(op)) + (counts_groups ? 4 : 0);
+  params.size = static_cast<uint32_t>(param_bytes(op) + sizeof(Kernel::groups));
   VkPipelineLayoutCreateInfo info = {};
   info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   info.setLayoutCount = 1;
@@ -85,7 +83,7 @@ Kernel make_kernel(const Gpu& gpu, Op op, const SpirvKernel& spirv, VkPipelineCa
   Kernel kernel;
   kernel.groups = static_cast<uint32_t>(spirv.groups);
   kernel.set_layout = make_set_layout(gpu, op);
-  kernel.layout = make_layout(gpu, op, kernel.set_layout.get(), spirv.groups > 1);
+  kernel.layout = make_layout(gpu, op, kernel.set_layout.get());
   kernel.pipeline = make_pipeline(gpu, op, spirv, kernel.layout.get(), cache);
   return kernel;
 }
@@ -94,21 +92,27 @@ Kernel make_kernel(const Gpu& gpu, Op op, const SpirvKernel& spirv, VkPipelineCa
 
 const Kernel& Kernels::choose(Op op, const void* params) const {
   const Forms& forms = forms_[static_cast<std::size_t>(op)];
-  return forms.lanes.pipeline.get() != VK_NULL_HANDLE && spirv_kernel(op, true).applies(params) ? forms.lanes
-                                                                                                : forms.any;
+  for (const SpirvForm form : {SpirvForm::lanes, SpirvForm::stride}) {
+    const Kernel& kernel = forms[static_cast<std::size_t>(form)];
+    if (kernel.pipeline.get() != VK_NULL_HANDLE && spirv_kernel(op, form).applies(params)) return kernel;
+  }
+  return forms[static_cast<std::size_t>(SpirvForm::any)];
 }
 
-void Kernels::add(Kernel any, Kernel lanes) { forms_.push_back({std::move(any), std::move(lanes)}); }
+void Kernels::add(Forms forms) { forms_.push_back(std::move(forms)); }
 
 Kernels make_kernels(const Gpu& gpu, const PipelineCache& file) {
   const std::vector<unsigned char> kept = file.load();
   const Handle<VkPipelineCache> cache = make_cache(gpu, kept);
   Kernels kernels;
   for (const Op op : all_ops()) {
-    Kernel any = make_kernel(gpu, op, spirv_kernel(op, false), cache.get());
-    const SpirvKernel& lanes = spirv_kernel(op, true);
-    const bool wanted = gpu.processor() && lanes.words != nullptr;
-    kernels.add(std::move(any), wanted ? make_kernel(gpu, op, lanes, cache.get()) : Kernel());
+    Kernels::Forms forms;
+    for (const SpirvForm form : kSpirvForms) {
+      const SpirvKernel& spirv = spirv_kernel(op, form);
+      if (spirv.words == nullptr || (form != SpirvForm::any && !gpu.processor())) continue;
+      forms[static_cast<std::size_t>(form)] = make_kernel(gpu, op, spirv, cache.get());
+    }
+    kernels.add(std::move(forms));
   }
   if (!file.path().empty()) {
     const std::vector<unsigned char> data = data_of(gpu, cache.get());

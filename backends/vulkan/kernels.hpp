@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "berth/ops.hpp"
+#include "spirv_kernels.hpp"
 #include "vulkan/gpu.hpp"
 #include "vulkan/pipeline_cache.hpp"
 
@@ -11,23 +13,22 @@ namespace berth::vulkan {
 /// One form of an operation, ready to be bound.
 struct Kernel {
   Handle<VkDescriptorSetLayout> set_layout;  // buffer i is binding i
-  Handle<VkPipelineLayout> layout;           // that set, and the parameters as push constants
+  Handle<VkPipelineLayout> layout;           // that set; the parameters and the number of groups as push constants
   Handle<VkPipeline> pipeline;
-  uint32_t groups = 1;  // of kGroupSize items that a work-group runs; if several, how many there are follows the params
+  uint32_t groups = 1;  // of kGroupSize items that a work-group runs
 };
 
 /// Every operation's kernels.
 class Kernels {
  public:
+  /// An operation's, by SpirvForm; without a pipeline where the device has no use for the form.
+  using Forms = std::array<Kernel, std::size(kSpirvForms)>;
+
   /// The one to run with these parameters.
   const Kernel& choose(Op op, const void* params) const;
-  void add(Kernel any, Kernel lanes);
+  void add(Forms forms);
 
  private:
-  struct Forms {
-    Kernel any;
-    Kernel lanes;  // without a pipeline where there is none
-  };
   std::vector<Forms> forms_;  // by the number of the operation
 };
 

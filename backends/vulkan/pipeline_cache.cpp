@@ -38,8 +38,8 @@ std::string hex(u64 value, int digits) {
 u64 kernels_hash() {
   u64 hash = 0xcbf29ce484222325u;
   for (const Op op : all_ops()) {
-    for (const bool lanes : {false, true}) {
-      const SpirvKernel& kernel = spirv_kernel(op, lanes);
+    for (const SpirvForm form : kSpirvForms) {
+      const SpirvKernel& kernel = spirv_kernel(op, form);
       for (std::size_t i = 0; i < kernel.bytes / 4; ++i) hash = (hash ^ kernel.words[i]) * 0x100000001b3u;
     }
   }

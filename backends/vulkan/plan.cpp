@@ -111,12 +111,11 @@ void VkPlan::dispatch(VkCommandBuffer commands, const Launch& launch) const {
   api.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &launch.set, 0, nullptr);
   api.vkCmdPushConstants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<uint32_t>(launch.params.size()),
                          launch.params.data());
-  const uint32_t each = launch.kernel->groups;
-  if (each > 1) {
-    api.vkCmdPushConstants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, static_cast<uint32_t>(launch.params.size()),
-                           sizeof launch.groups, &launch.groups);
-  }
-  api.vkCmdDispatch(commands, (launch.groups - 1) / each + 1, 1, 1);
+  api.vkCmdPushConstants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, static_cast<uint32_t>(launch.params.size()),
+                         sizeof launch.groups, &launch.groups);
+  const uint32_t work_groups = (launch.groups - 1) / launch.kernel->groups + 1;
+  const uint32_t rows = std::min(gpu_.rows(), work_groups);
+  api.vkCmdDispatch(commands, (work_groups - 1) / rows + 1, rows, 1);
 }
 
 void VkPlan::record() {

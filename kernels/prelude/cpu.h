@@ -9,6 +9,7 @@
 #define INOUT(i, T, x) T *x,
 #define PARAMS(name) const name##_params& p) {
 #define LANES_IF(condition)
+#define STRIDE_IF(condition)
 #define SHARED(T, x, k) T x[k];
 #define BODY
 #define END }

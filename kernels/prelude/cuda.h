@@ -36,6 +36,7 @@ static inline __device__ void atomicMin(u32* x, u32 v) { __nvvm_atom_min_gen_ui(
 #define INOUT(i, T, x) T* __restrict__ x,
 #define PARAMS(name) const name##_params p) {
 #define LANES_IF(condition)
+#define STRIDE_IF(condition)
 #define SHARED(T, x, k) __shared__ T x[k];
 #define BODY
 #define END }

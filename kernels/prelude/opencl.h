@@ -11,6 +11,7 @@ typedef int s32;
 #define INOUT(i, T, x) __global T *restrict x,
 #define PARAMS(name) const struct name##_params p) {
 #define LANES_IF(condition)
+#define STRIDE_IF(condition)
 #define SHARED(T, x, k) __local T x[k];
 #define BODY
 #define END }
