@@ -6,8 +6,10 @@
 //   4. Each side's line by least squares along its dominant axis, an eighth trimmed off both ends.
 // Ties go to the first point in walking order. Points are half pixels (contour_trace); heights q4 of half pixels.
 // Bounds: extents <= 16000 px, so differences of points are below 2^15 and cross products below 2^31.
-#define POINT_X(i) S32(points[start + (i) % count] & 0xffffu)
-#define POINT_Y(i) S32((points[start + (i) % count] >> 16) | 1u)
+// Indices run on into the second turn: 0 <= i < 2 count.
+#define POINT(i) points[start + ((i) < count ? (i) : (i)-count)]
+#define POINT_X(i) S32(POINT(i) & 0xffffu)
+#define POINT_Y(i) S32((POINT(i) >> 16) | 1u)
 
 FN u32 square_distance(int dx, int dy) { return U32(dx * dx + dy * dy); }
 FN u32 chord_distance(int chord_x, int chord_y, int dx, int dy) {
@@ -121,7 +123,7 @@ BODY
           u32 most = 0u;
           int at = -1;
           for (int i = state[FIRST] + LID; i < state[LAST]; i += GROUP_SIZE) {
-            const u32 point = points[start + i % count];
+            const u32 point = POINT(i);
             const int dx = S32(point & 0xffffu) - state[FROM_X];
             const int dy = S32((point >> 16) | 1u) - state[FROM_Y];
             const u32 far = state[SEARCH] <= FROM_FIRST ? square_distance(dx, dy)
@@ -175,7 +177,7 @@ BODY
           state[VERTICES] = 2;
           if (first == other) state[DONE] = 1;
         } else if (search >= SPLITS && search < POLISHED) {
-          if (at >= 0) state[VERTEX + (search & 3)] = at % count;
+          if (at >= 0) state[VERTEX + (search & 3)] = at < count ? at : at - count;
         } else {
           const int k = search < 4 ? search - 2 : search < SPLITS ? state[SPLIT] + (search & 1) : search - POLISHED;
           const u32 length = square_root(square_distance(state[CHORD_X], state[CHORD_Y]));
@@ -304,7 +306,7 @@ BODY
             // Between two nodes the walk follows a row boundary over whole pixel columns.
             const int x_from = POINT_X(i);
             const int x_to = POINT_X(i + 1);
-            const u32 y_node = points[start + i % count] >> 16;
+            const u32 y_node = POINT(i) >> 16;
             const int v = (S32(y_node + (y_node & 1u)) - v_middle) >> halvings;
             if ((x_to > x_from) == (dx > 0)) {
               const int x_end = min(max(x_from, x_to), u_last + 1);
@@ -384,6 +386,7 @@ BODY
   }
 END
 
+#undef POINT
 #undef POINT_X
 #undef POINT_Y
 #undef VERTEX

@@ -23,33 +23,40 @@ BODY
       u32 row1 = 0u;
       u32 row2 = 0u;
       u32 row3 = 0u;
+      // Columns first: the extrema of three tiles, for the item's two tile words (a, b) and their neighbours.
+      const int a = word_x * 2;
+      const int b = a + 1;
+      const int left = max(a - 1, 0);
+      const int right = min(b + 1, stride - 1);
+      const u32 low_a = bytes_min(bytes_min(minima[above + a], minima[here + a]), minima[below + a]);
+      const u32 low_b = bytes_min(bytes_min(minima[above + b], minima[here + b]), minima[below + b]);
+      const u32 high_a = bytes_max(bytes_max(maxima[above + a], maxima[here + a]), maxima[below + a]);
+      const u32 high_b = bytes_max(bytes_max(maxima[above + b], maxima[here + b]), maxima[below + b]);
+      u32 low_left = bytes_min(bytes_min(minima[above + left], minima[here + left]), minima[below + left]) >> 24;
+      u32 high_left = bytes_max(bytes_max(maxima[above + left], maxima[here + left]), maxima[below + left]) >> 24;
+      u32 low_right = bytes_min(bytes_min(minima[above + right], minima[here + right]), minima[below + right]) << 24;
+      u32 high_right = bytes_max(bytes_max(maxima[above + right], maxima[here + right]), maxima[below + right]) << 24;
+      if (left == a) {  // at the border the outermost tile stands in for the missing one
+        low_left = low_a & 255u;
+        high_left = high_a & 255u;
+      }
+      if (right == b) {
+        low_right = low_b & 0xff000000u;
+        high_right = high_b & 0xff000000u;
+      }
       for (int side = 0; side < 2; ++side) {
-        const int x = word_x * 2 + side;
-        const int left = max(x - 1, 0);
-        const int right = min(x + 1, stride - 1);
-        // Columns first: the extrema of three tiles, for this word and its neighbours.
-        u32 low = bytes_min(bytes_min(minima[above + x], minima[here + x]), minima[below + x]);
-        u32 high = bytes_max(bytes_max(maxima[above + x], maxima[here + x]), maxima[below + x]);
-        u32 low_left = bytes_min(bytes_min(minima[above + left], minima[here + left]), minima[below + left]) >> 24;
-        u32 high_left = bytes_max(bytes_max(maxima[above + left], maxima[here + left]), maxima[below + left]) >> 24;
-        u32 low_right = bytes_min(bytes_min(minima[above + right], minima[here + right]), minima[below + right]) << 24;
-        u32 high_right = bytes_max(bytes_max(maxima[above + right], maxima[here + right]), maxima[below + right]) << 24;
-        if (left == x) {  // at the border the outermost tile stands in for the missing one
-          low_left = low & 255u;
-          high_left = high & 255u;
-        }
-        if (right == x) {
-          low_right = low & 0xff000000u;
-          high_right = high & 0xff000000u;
-        }
-        low = bytes_min(low, bytes_min((low << 8) | low_left, (low >> 8) | low_right));
-        high = bytes_max(high, bytes_max((high << 8) | high_left, (high >> 8) | high_right));
+        u32 low = side == 0 ? low_a : low_b;
+        u32 high = side == 0 ? high_a : high_b;
+        low = bytes_min(low, bytes_min((low << 8) | (side == 0 ? low_left : low_a >> 24),
+                                       (low >> 8) | (side == 0 ? low_b << 24 : low_right)));
+        high = bytes_max(high, bytes_max((high << 8) | (side == 0 ? high_left : high_a >> 24),
+                                         (high >> 8) | (side == 0 ? high_b << 24 : high_right)));
         const u32 range = high - low;  // per byte: high >= low, no borrow
         const u32 judged = bytes_ge(range, contrast) * 255u;
         const u32 even = ((range & 0x00ff00ffu) * U32(p.cut) >> 8) & 0x00ff00ffu;
         const u32 odd = ((range >> 8) & 0x00ff00ffu) * U32(p.cut) & 0xff00ff00u;
         const u32 limits = low + (even | odd);  // at most high: no carry
-        const int first = tile_y * 4 * p.row_words * 8 + x * 4;
+        const int first = tile_y * 4 * p.row_words * 8 + (a + side) * 4;
         for (int k = 0; k < 4; ++k) {
           if (((judged >> (8 * k)) & 1u) != 0u) {
             const u32 limit = ((limits >> (8 * k)) & 255u) * 0x01010101u;
