@@ -6,8 +6,8 @@
 //   4. Each side's line by least squares along its dominant axis, an eighth trimmed off both ends.
 // Ties go to the first point in walking order. Points are half pixels (contour_trace); heights q4 of half pixels.
 // Bounds: extents <= 16000 px, so differences of points are below 2^15 and cross products below 2^31.
-// Indices run on into the second turn: 0 <= i < 2 count.
-#define POINT(i) points[start + ((i) < count ? (i) : (i)-count)]
+// Indices run on into the second turn: 0 <= i < 2 count; in the first, i - count wraps above i.
+#define POINT(i) points[start + min(U32(i), U32((i)-count))]
 #define POINT_X(i) S32(POINT(i) & 0xffffu)
 #define POINT_Y(i) S32((POINT(i) >> 16) | 1u)
 
