@@ -25,7 +25,7 @@ class Conv:
 NETWORKS = {
     "paper": ([Conv(96, 11, 4, 0, 1, True), Conv(256, 5, 1, 2, 2, True), Conv(384, 3, 1, 1), Conv(384, 3, 1, 1, 2),
                Conv(256, 3, 1, 1, 2, True)], [4096, 4096]),
-    "lite": ([Conv(32, 8, 4, 2, 1, True), Conv(64, 5, 1, 2, 1, True), Conv(96, 3, 1, 1), Conv(96, 3, 1, 1),
+    "lite": ([Conv(32, 8, 4, 0, 1, True), Conv(64, 5, 1, 2, 1, True), Conv(96, 3, 1, 1), Conv(96, 3, 1, 1),
               Conv(64, 3, 1, 1, 1, True)], [256, 64]),
 }
 
