@@ -110,10 +110,14 @@ def _per_channel(values, device):
 class _Weighted:
     def __init__(self, weights, layer, device, largest_input, stride=(1, 1), pad=(0, 0), groups=1):
         self.products = _Products(weights, stride, pad, groups, largest_input, device)
-        self.bias = _per_channel(layer.bias, device)
+        self.device = device
+        self.set_bias(layer.bias)
         self.raw = isinstance(layer, Heads)
         if not self.raw:
             self.multiplier, self.shift = _per_channel(layer.multiplier, device), layer.shift
+
+    def set_bias(self, bias):
+        self.bias = _per_channel(bias, self.device)
 
     def __call__(self, x):
         sums = self.products(x)

@@ -109,8 +109,9 @@ class Layers(unittest.TestCase):
         sums = [-2**30, -1, 0, 1, 127, 128, 32767, 32768, 40000, 2**20, 2**30]
         for shift in (0, 1, 7, 15, 20):
             for m in (0, 1, 128, 16384, 32767):
-                got = integer.requantised(torch.tensor(sums, dtype=torch.int32)[None, None, None], torch.tensor(-3), m, shift)
-                self.assertEqual(got.flatten().tolist(), [slow.requantise(s, -3, m, shift) for s in sums], (shift, m))
+                x = torch.tensor(sums, dtype=torch.int32)
+                got = integer.requantised(x, torch.tensor(-3), m, shift)
+                self.assertEqual(got.tolist(), [slow.requantise(s, -3, m, shift) for s in sums], (shift, m))
 
     def test_response_norm_has_the_bits_of_the_definition(self):
         for sigma_in, sigma_out, alpha in ((1, 1, 1e-4), (0.05, 0.04, 2e-2), (1, 0.3, 1), (0.001, 0.01, 1e-4)):
@@ -235,8 +236,8 @@ class Files(unittest.TestCase):
         at = 8 + len(self.model.name) + len(self.model.notes)
         for offset, value, word in ((0, 64, "side"), (0, -256, "side"), (4, 2, "normalise"), (8, 999, "mean"),
                                     (12, 0, "layers"), (12, 2**31 - 1, "layers"), (16, 9, "kind 9"), (20, 8, ""),
-                                    (20, -4, "in_channels"), (24, 2**30, "out_channels"), (24, 2**20, "weights"), (24, 0, ""),
-                                    (28, 0, ""), (36, 0, "stride"), (44, 8, "pads"), (52, 0, "groups"),
+                                    (20, -4, "in_channels"), (24, 2**30, "out_channels"), (24, 2**20, "weights"),
+                                    (24, 0, ""), (28, 0, ""), (36, 0, "stride"), (44, 8, "pads"), (52, 0, "groups"),
                                     (52, 3, "groups"), (56, 31, "shift"), (56, -1, "shift")):
             self.refused(self.with_integer(at + offset, value), word)
         self.refused(self.with_integer(0, 2**31 - 1), "name")

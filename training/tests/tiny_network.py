@@ -38,7 +38,8 @@ def hashed(x):
 def window(seed):
     j, i = np.mgrid[:SIDE, :SIDE]
     noise = (hashed(seed * 65536 + j * 256 + i) >> np.uint32(26)).astype(np.int64)
-    pixel = ((abs(((seed % 3 + 1) * i + 5 * seed & 127) - 64) + abs((j + 11 * seed & 127) - 64) + noise) >> (seed & 3)) + 16 * seed
+    columns, rows = abs(((seed % 3 + 1) * i + 5 * seed & 127) - 64), abs((j + 11 * seed & 127) - 64)
+    pixel = ((columns + rows + noise) >> (seed & 3)) + 16 * seed
     assert pixel.max() <= 255
     return pixel.astype(np.uint8)
 

@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""Turns a trained run into an integer network, RUN to NET.berthnet, and says what that costs.
+
+Images of the sets' training parts give the ranges of activations; others of them choose, layer by layer, how much of a
+range to keep (all, 99.99 %, 99.9 %, least squares), by how far scores and geometry move from the float network's."""
+import argparse
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+import float_run
+import model_file
+from batches import Samples
+from integer_network import IntegerNetwork
+from navset import NavSet
+from progress import Progress
+from quantisation import METHODS, Builder, DoesNotFit, Ranges, correct_biases, dequantised, signal_to_noise
+
+
+@dataclass
+class Difference:
+    """Between integers and floats on the same images. logits: rms of the differences of present - absent, each held to
+    +-8 (the ends of the score's table); geometry: rms in the network's units, on targets."""
+    changed: int
+    logits: float
+    geometry: float
+
+    @property
+    def error(self):
+        """To be made small; a tenth of a logit counts as much as 1.3 px of the centre or 1 % of d."""
+        return self.logits + 10 * self.geometry
+
+    def __str__(self):
+        return f"{self.changed} decisions, logits {self.logits:.4f}, geometry {self.geometry:.5f}"
+
+
+def difference(got, exact, targets):
+    """got, exact: float64[n, 5]."""
+    logits = [np.clip(heads[:, 1] - heads[:, 0], -8, 8) for heads in (got, exact)]
+    changed = int(((logits[0] >= 0) != (logits[1] >= 0)).sum())
+    rms = float(np.sqrt(np.mean((logits[0] - logits[1]) ** 2)))
+    off = (got - exact)[targets, 2:]
+    return Difference(changed, rms, float(np.sqrt(np.mean(off**2))) if off.size else 0.0)
+
+
+class Search:
+    """Tries sigmas on images that gave no ranges."""
+
+    def __init__(self, run, ranges, images, targets):
+        self.run, self.ranges, self.images, self.targets = run, ranges, images, targets
+        self.builder, self.exact = Builder(run, ranges), run.outputs(images)
+
+    def sigmas(self, methods):
+        """methods: by step. A norm's `same` is its input's sigma: nothing is rounded twice where it changes little."""
+        out = {}
+        for name, method in methods.items():
+            out[name] = out["conv" + name[4:]] if method == "same" else self.ranges.sigma(name, method)
+        return out
+
+    def tried(self, methods, corrected=True):
+        """(Quantised, Difference), or (None, None) where they do not fit."""
+        try:
+            quantised = self.builder.build(self.sigmas(methods))
+        except DoesNotFit:
+            return None, None
+        if corrected:
+            correct_biases(quantised, self.ranges)
+        return quantised, self.measured(quantised)
+
+    def measured(self, quantised):
+        got = IntegerNetwork(quantised.model, self.run.device).found(self.images).raw
+        return difference(dequantised(quantised, got), self.exact, self.targets)
+
+    def names(self):
+        return [name for name in self.ranges.largest if name.startswith(("conv", "norm", "fc"))]
+
+    def best(self, corrected, report, progress=None):
+        """The methods by step that came out best: the best one for all, then layer by layer."""
+        names, tries = self.names(), []
+        for method in METHODS:
+            methods = {name: "same" if name.startswith("norm") else method for name in names}
+            _, found = self.tried(methods, corrected)
+            report(f"| all {method} | {found or 'does not fit'} |")
+            if found:
+                tries.append((found.error, methods, found))
+        if not tries:
+            raise DoesNotFit(f"{self.run.name}: no method fits all layers; is this run trained?")
+        error, methods, found = min(tries, key=lambda one: one[0])
+        done, total = 0, len(names) * (len(METHODS) - 1)
+        for name in names:
+            for method in [*METHODS, *(["same"] if name.startswith("norm") else [])]:
+                if method == methods[name]:
+                    continue
+                changed = {**methods, name: method}
+                _, other = self.tried(changed, corrected)
+                if other and other.error < 0.99 * error:  # a hundredth is chance
+                    error, methods, found = other.error, changed, other
+                    report(f"| {name} {method} | {found} |")
+                done += 1
+                if progress:
+                    progress(min(done, total))
+        if progress:
+            progress(total)
+        return methods
+
+
+def chosen_images(folders, count, seed):
+    """Samples of all training parts, and `count` of their indices by seed, targets as frequent as there."""
+    samples = Samples([NavSet(folder) for folder in folders], "train")
+    order = np.random.default_rng([seed, 4]).permutation(len(samples))
+    if count > len(samples):
+        raise ValueError(f"{count} images wanted, the sets' training parts have {len(samples)}")
+    return samples, order[:count]
+
+
+def layer_table(quantised, methods, noise):
+    yield "| layer | greatest | by | shift | M | weights' greatest | dB so far | dB alone |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for name, layer in zip(quantised.names, quantised.model.layers):
+        greatest = "" if name == "heads" else f"{127 * quantised.sigmas[name]:.3g}"
+        shift = multipliers = weights = ""
+        if hasattr(layer, "shift"):
+            shift, multipliers = layer.shift, f"{layer.multiplier.min()} to {layer.multiplier.max()}"
+        if hasattr(layer, "weights"):
+            top = np.abs(layer.weights.reshape(len(layer.weights), -1).astype(int)).max(1)
+            weights = f"{top.min()} to {top.max()}"
+        yield (f"| {name} | {greatest} | {methods.get(name, '')} | {shift} | {multipliers} | {weights} | "
+               f"{noise[name][0]:.1f} | {noise[name][1]:.1f} |")
+
+
+def notes_of(run, folders):
+    """What the file says about its origin."""
+    trained = ", ".join(f"{m['set']} seed {m['seed']} ({m['image_hash']})" for m in run.settings.get("manifests", [])
+                        if "seed" in m) or "unknown sets"
+    calibrated = ", ".join(f"{m['set']} seed {m['seed']} ({m['image_hash']})"
+                           for m in (NavSet(folder).manifest for folder in folders) if "seed" in m)
+    return (f"{run.settings['network']} of run {run.name}, iteration {run.iteration} of {run.settings['iterations']}, seed "
+            f"{run.settings['seed']}; trained on, last tested on: {trained}; calibrated on: {calibrated or 'unknown sets'}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", help="a run's folder (its newest state), or one snapshot in it")
+    parser.add_argument("--calibrate", action="append", required=True, metavar="SET", help="repeatable")
+    parser.add_argument("-o", "--output", required=True, metavar="NET.berthnet")
+    parser.add_argument("--name", help="the network's name in the file (default: the run's)")
+    parser.add_argument("--images", type=int, default=300, help="for the ranges")
+    parser.add_argument("--search-images", type=int, default=500,
+                        help="for the choice of methods; 0: least squares everywhere")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--device", choices=["auto", "cpu", "cuda"], default="auto")
+    parser.add_argument("--threads", type=int, default=2)
+    arguments = parser.parse_args()
+    torch.set_num_threads(arguments.threads)
+    device = arguments.device if arguments.device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
+    try:
+        run = float_run.load(arguments.run, device)
+        samples, order = chosen_images(arguments.calibrate, arguments.images + arguments.search_images, arguments.seed)
+        for_ranges, for_search = order[:arguments.images], order[arguments.images:]
+        ranges = Ranges(run, samples.images(for_ranges))
+        print(f"{run.name}, iteration {run.iteration}; {len(for_ranges)} images for ranges, {len(for_search)} for the "
+              "choice")
+        if len(for_search):
+            print("\n| methods | changed against float |\n|---|---|", flush=True)
+            search = Search(run, ranges, samples.images(for_search), samples.present[for_search] > 0)
+            bar = Progress("choosing", 1)
+            bar.total = len(search.names()) * (len(METHODS) - 1)
+            methods = search.best(True, lambda line: print(line, flush=True), bar)
+            print(f"| without bias correction | {search.tried(methods, False)[1]} |")
+            sigmas = search.sigmas(methods)
+        else:
+            methods = {n: "least squares" for n in ranges.largest if n.startswith(("conv", "norm", "fc"))}
+            sigmas = {name: ranges.sigma(name, method) for name, method in methods.items()}
+        quantised = Builder(run, ranges).build(sigmas, arguments.name or run.name, notes_of(run, arguments.calibrate))
+        correct_biases(quantised, ranges)
+        print()
+        for line in layer_table(quantised, methods, signal_to_noise(quantised, run, ranges.images[:50])):
+            print(line)
+        size = model_file.write(quantised.model, arguments.output)
+        print(f"\n{arguments.output}: {size} bytes; {quantised.model.notes}")
+    except (DoesNotFit, model_file.ModelError, FileNotFoundError, ValueError) as error:
+        sys.exit(f"quantise.py: {error}")
+
+
+if __name__ == "__main__":
+    main()
