@@ -2,6 +2,7 @@
 // clang-format off
 #include "fixed.h"
 #include "runs.h"
+#include "tensor.h"
 
 #include "flat_field.inl"
 #include "halve.inl"
@@ -19,4 +20,11 @@
 #include "contour_trace.inl"
 #include "quad_fit.inl"
 #include "edge_refine.inl"
+#include "extract_window.inl"
+#include "window_statistics.inl"
+#include "normalize_window.inl"
+#include "convolve.inl"
+#include "local_response_norm.inl"
+#include "max_pool.inl"
+#include "fully_connected.inl"
 // clang-format on

@@ -10,27 +10,39 @@
                 numbered in raster order. x is a crack between pixels: x = k lies left of pixel k.
      node       u32 a run end: x in the low half, the step to its successor's id (s16) in the high half.
      offsets    u32: for each word of bits the run ends before it within its group of 128 words, then for each group
-                the run ends before it; see run_count. */
+                the run ends before it; see run_count.
+
+   Layouts of the network's operations (docs/network-arithmetic.md)
+     tensor     u32[count, height, width, words]: four channels a word, s8, the first in the lowest byte; channels past
+                the last are 0.
+     channels   s32[channels, 2]: the bias and the multiplier M of each. */
 #ifndef BERTH_KERNELS_OPS_H
 #define BERTH_KERNELS_OPS_H
 
-#define BERTH_OPS(X) \
-  X(flat_field)      \
-  X(halve)           \
-  X(tile_extrema)    \
-  X(tile_histogram)  \
-  X(normalize)       \
-  X(threshold)       \
-  X(despeckle)       \
-  X(run_count)       \
-  X(scan)            \
-  X(run_emit)        \
-  X(run_link)        \
-  X(contour_measure) \
-  X(contour_collect) \
-  X(contour_trace)   \
-  X(quad_fit)        \
-  X(edge_refine)
+#define BERTH_OPS(X)     \
+  X(flat_field)          \
+  X(halve)               \
+  X(tile_extrema)        \
+  X(tile_histogram)      \
+  X(normalize)           \
+  X(threshold)           \
+  X(despeckle)           \
+  X(run_count)           \
+  X(scan)                \
+  X(run_emit)            \
+  X(run_link)            \
+  X(contour_measure)     \
+  X(contour_collect)     \
+  X(contour_trace)       \
+  X(quad_fit)            \
+  X(edge_refine)         \
+  X(extract_window)      \
+  X(window_statistics)   \
+  X(normalize_window)    \
+  X(convolve)            \
+  X(local_response_norm) \
+  X(max_pool)            \
+  X(fully_connected)
 
 struct flat_field_params {
   int words; /* pixel words */
@@ -146,6 +158,74 @@ struct edge_refine_params {
   int max_contours;
 };
 
+struct extract_window_params {
+  int width; /* of the image, px */
+  int height;
+  int row_words; /* pixel words in a row: padded_width / 4 */
+  int count;     /* windows */
+  int out_words; /* pixel words in a row of a window */
+  int out_height;
+};
+
+struct window_statistics_params {
+  int count;  /* windows: a work-group each */
+  int words;  /* pixel words of a window */
+  int stride; /* every stride-th word is counted, 66051 pixels at most */
+};
+
+struct normalize_window_params {
+  int count;
+  int words; /* pixel words of a window */
+};
+
+struct convolve_params {
+  int count; /* tensors */
+  int height;
+  int width;
+  int words;
+  int out_height;
+  int out_width;
+  int out_words;
+  int kernel_height;
+  int kernel_width;
+  int stride_y;
+  int stride_x;
+  int pad_y; /* rows of zeros above */
+  int pad_x;
+  int group_words;     /* input words of a group: words / groups */
+  int group_out_words; /* output words of a group: out_words / groups */
+  int shift;           /* of the requantisation: 0 to 31 */
+};
+
+struct local_response_norm_params {
+  int pixels; /* of all tensors */
+  int words;
+};
+
+struct max_pool_params {
+  int count; /* tensors */
+  int height;
+  int width;
+  int words;
+  int out_height; /* (height - kernel_side) / stride + 1, rounded down */
+  int out_width;
+  int kernel_side;
+  int stride;
+};
+
+struct fully_connected_params {
+  int count; /* tensors */
+  int height;
+  int width;
+  int words;
+  int rows; /* of the kernel */
+  int columns;
+  int grid_height; /* positions in a tensor: at most height - rows + 1 */
+  int grid_width;
+  int out_channels; /* a multiple of 4 */
+  int shift;        /* of the requantisation: 0 to 31, or -1 for the sums as they are */
+};
+
 /* Words of a contour record in `contours` (after a header of 8: run ends, contours and points that were needed). */
 #define CONTOUR_HEADER 8
 #define CONTOUR_WORDS 4 /* id of the first node; nodes, bit 31 set for a hole; row of the first node; first point */
@@ -162,5 +242,17 @@ struct edge_refine_params {
    the quadrilateral's u_ref), slope, stations used, residual. */
 #define EDGE_WORDS 16
 #define EDGE_SIDE_WORDS 4
+
+/* Neighbouring output pixels that an item of convolve makes, of one word: a launch has count * out_height *
+   ceil(out_width / CONVOLVE_PIXELS) * out_words items. */
+#define CONVOLVE_PIXELS 8
+
+/* Output words, and positions, that a work-group of fully_connected makes: a launch has ceil(out_channels / 4 /
+   FULLY_CONNECTED_WORDS) * ceil(count * grid_height * grid_width / FULLY_CONNECTED_POSITIONS) groups. */
+#define FULLY_CONNECTED_WORDS 4
+#define FULLY_CONNECTED_POSITIONS 4
+
+/* Entries of the table of local_response_norm. */
+#define RESPONSE_TABLE 104
 
 #endif

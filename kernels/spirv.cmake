@@ -71,6 +71,7 @@ function(berth_embed_spirv out)
 #include \"ops.h\"
 #include \"fixed.h\"
 #include \"runs.h\"
+#include \"tensor.h\"
 #include \"@op@.inl\"
 ")
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BERTH_KERNELS_DIR}/${op}.inl)

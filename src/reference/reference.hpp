@@ -24,5 +24,13 @@ void contour_collect(const contour_collect_params& p, const u32* spans, const u3
 void contour_trace(const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points);
 void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads);
 void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* levels, const s32* quads, s32* edges);
+void extract_window(const extract_window_params& p, const u32* pixels, const s32* windows, u32* out_pixels);
+void window_statistics(const window_statistics_params& p, const u32* pixels, s32* statistics);
+void normalize_window(const normalize_window_params& p, const u32* pixels, const s32* statistics, u32* tensor);
+void convolve(const convolve_params& p, const u32* tensor, const u32* weights, const s32* channels, u32* out_tensor);
+void local_response_norm(const local_response_norm_params& p, const u32* tensor, const s32* table, u32* out_tensor);
+void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor);
+void fully_connected(const fully_connected_params& p, const u32* tensor, const u32* weights, const s32* channels,
+                     u32* out_tensor);
 
 }  // namespace berth::reference
