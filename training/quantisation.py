@@ -61,6 +61,11 @@ class Quantised:
     sigmas: dict
     units: dict
 
+    def scales(self):
+        """By weighted step: the value of a weight of 1, per channel."""
+        before = dict(zip(self.names, [INPUT_SCALE, *(self.sigmas[name] for name in self.names)]))
+        return {name: unit / before[name] for name, unit in self.units.items()}
+
 
 class DoesNotFit(ValueError):
     """A layer that int8 weights and 32-bit sums cannot hold."""
@@ -81,14 +86,14 @@ def _natural_scale(weights):
     return np.where(largest > 0, largest, max(largest.max(), 1e-6)) / 127
 
 
-def requantised_layer(weights, bias, sigma_in, sigma_out, reach, largest_input):
+def requantised_layer(weights, bias, sigma_in, sigma_out, reach, largest_input, scale=None):
     """(weights s8, bias s32, M, shift, unit) of float weights[out, ...] and bias[out].
 
     M = scale * sigma_in / sigma_out * 2^(22 + shift) has to stay below 2^15, and at least 128 times the channel's reach,
     its greatest activation in calibration: the 16 bits before the multiplication end at 32,767, out at 32,767 M / 2^22.
     A channel outside gets a coarser or a finer scale (its greatest weights clipped). The shift is the one whose weights
-    come closest to the float ones."""
-    natural = _natural_scale(weights)
+    come closest to the float ones. `scale`: what is natural, if not that the greatest weight is 127."""
+    natural = _natural_scale(weights) if scale is None else scale
     reach = np.clip(reach / sigma_out * 1.02, 1, 127)
     first = math.floor(math.log2(32767 / (natural.max() * sigma_in / sigma_out * 2**22)))
     if first < 0:
@@ -136,14 +141,19 @@ def fixed_point(factor):
     return min(round(factor * 2.0**k), 2**30 - 1), k
 
 
-class Builder:
-    """Builds integer networks of one run for any choice of sigmas."""
+def weighted_modules(network):
+    """Convolutions and fully connected layers by step, without the heads."""
+    return {**{f"conv{i}": conv for i, conv in enumerate(network.convs, 1)},
+            **{f"fc{i}": layer for i, layer in enumerate(network.hidden, len(network.convs) + 1)}}
 
-    def __init__(self, run, ranges):
-        self.run, self.ranges = run, ranges
-        network = run.network
-        self.weights = {f"conv{i}": conv for i, conv in enumerate(network.convs, 1)}
-        self.weights |= {f"fc{i}": layer for i, layer in enumerate(network.hidden, len(network.convs) + 1)}
+
+class Builder:
+    """Builds integer networks of one run for any choice of sigmas. scales: of the weights, by step, where they are
+    given (after fine-tuning)."""
+
+    def __init__(self, run, ranges, scales=None):
+        self.run, self.ranges, self.scales = run, ranges, scales or {}
+        self.weights = weighted_modules(run.network)
 
     def _float(self, module):
         return module.weight.detach().cpu().numpy(), module.bias.detach().cpu().double().numpy()
@@ -153,7 +163,7 @@ class Builder:
         first = name == "conv1"
         try:
             return requantised_layer(convert(weights), bias + bias_shift, sigma_in, sigma_out,
-                                     self.ranges.channel_largest[name], 128 if first else 127)
+                                     self.ranges.channel_largest[name], 128 if first else 127, self.scales.get(name))
         except DoesNotFit as error:
             raise DoesNotFit(f"{name}: {error}") from None
 
@@ -210,8 +220,10 @@ class Builder:
     def _heads(self, sigma):
         (score, score_bias), (geometry, geometry_bias) = (self._float(head) for head in (self.run.network.score,
                                                                                          self.run.network.geometry))
-        scale = _natural_scale(np.concatenate([score, geometry]))
-        scale[:2] = scale[:2].max()  # two scores are compared: one scale
+        scale = self.scales.get("heads")
+        if scale is None:
+            scale = _natural_scale(np.concatenate([score, geometry]))
+            scale[:2] = scale[:2].max()  # two scores are compared: one scale
         integers = weights_in(np.concatenate([score, geometry]), scale)
         unit = scale * sigma
         return Heads(integers, held_bias(np.concatenate([score_bias, geometry_bias]) / unit, integers, 0, 127)), unit

@@ -13,10 +13,11 @@ import torch
 import float_run
 import model_file
 from batches import Samples
+from fine_tune import FineTuner, SimulatedNetwork
 from integer_network import IntegerNetwork
 from navset import NavSet
 from progress import Progress
-from quantisation import METHODS, Builder, DoesNotFit, Ranges, correct_biases, dequantised, signal_to_noise
+from quantisation import METHODS, Builder, DoesNotFit, Ranges, correct_biases, dequantised, signal_to_noise, weighted_modules
 
 
 @dataclass
@@ -140,6 +141,22 @@ def notes_of(run, folders):
             f"{run.settings['seed']}; trained on, last tested on: {trained}; calibrated on: {calibrated or 'unknown sets'}")
 
 
+def fine_tuned(run, quantised, samples, images, sigmas, arguments):
+    """The network trained on with its rounding; `run` is left with the weights that came out."""
+    scales = quantised.scales()
+    simulated = SimulatedNetwork(run.network, quantised.sigmas, scales)
+    for name, module in weighted_modules(run.network).items():  # start where the correction has left the biases
+        layer = quantised.model.layers[quantised.names.index(name)]
+        if name != "conv1" or run.settings["normalise"]:
+            module.bias.data = torch.from_numpy(layer.bias * quantised.units[name]).to(module.bias)
+    tuner = FineTuner(simulated, run.settings, run.mean, samples, arguments.fine_tune, arguments.learning_rate, run.device)
+    before, after = tuner.tune(Progress("fine-tuning", arguments.fine_tune))
+    print(f"\nFine-tuning, {arguments.fine_tune} iterations: loss {before:.5f} to {after:.5f}.")
+    tuned = Builder(run, Ranges(run, images), scales)
+    return tuned.build(sigmas, quantised.model.name, f"{quantised.model.notes}; fine-tuned {arguments.fine_tune} "
+                       f"iterations at {arguments.learning_rate:g}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", help="a run's folder (its newest state), or one snapshot in it")
@@ -149,6 +166,9 @@ def main():
     parser.add_argument("--images", type=int, default=300, help="for the ranges")
     parser.add_argument("--search-images", type=int, default=500,
                         help="for the choice of methods; 0: least squares everywhere")
+    parser.add_argument("--fine-tune", type=int, default=0, metavar="N",
+                        help="train on for N iterations with the integers' rounding, if too many decisions change")
+    parser.add_argument("--learning-rate", type=float, default=2e-5, help="of --fine-tune")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", choices=["auto", "cpu", "cuda"], default="auto")
     parser.add_argument("--threads", type=int, default=2)
@@ -173,8 +193,13 @@ def main():
         else:
             methods = {n: "least squares" for n in ranges.largest if n.startswith(("conv", "norm", "fc"))}
             sigmas = {name: ranges.sigma(name, method) for name, method in methods.items()}
-        quantised = Builder(run, ranges).build(sigmas, arguments.name or run.name, notes_of(run, arguments.calibrate))
+        name, notes = arguments.name or run.name, notes_of(run, arguments.calibrate)
+        quantised = Builder(run, ranges).build(sigmas, name, notes)
         correct_biases(quantised, ranges)
+        if arguments.fine_tune:
+            quantised = fine_tuned(run, quantised, samples, ranges.images, sigmas, arguments)
+            if len(for_search):
+                print(f"| fine-tuned | {search.measured(quantised)} |")
         print()
         for line in layer_table(quantised, methods, signal_to_noise(quantised, run, ranges.images[:50])):
             print(line)

@@ -17,6 +17,7 @@ import torch.nn.functional as F
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 import evaluate  # noqa: E402
+import fine_tune  # noqa: E402
 import float_run  # noqa: E402
 import integer_network as integer  # noqa: E402
 import model_file  # noqa: E402
@@ -28,7 +29,8 @@ from navset import NavSet  # noqa: E402
 from tiny_network import window  # noqa: E402
 
 torch.set_num_threads(1)
-SETTINGS = {"network": "lite", "normalise": True, "seed": 1, "iterations": 9}
+SETTINGS = {"network": "lite", "normalise": True, "seed": 1, "iterations": 9, "learning_rate": 1e-3, "weight_decay": 0.0,
+            "augment": False, "dropout": 0.0}
 
 
 def random_network(name):
@@ -154,6 +156,59 @@ class Networks(unittest.TestCase):
             self.assertLess(error(kept[3] / 127), error(kept[3] / 127 * factor))
 
 
+class FineTuning(unittest.TestCase):
+    def test_simulates_the_integer_network(self):
+        """Stage by stage on the integers' activations: what differs are multipliers and table in fixed point, where a
+        value is at the edge between two integers."""
+        images = np.stack([window(seed) for seed in range(2)])
+        run = random_run()
+        q, _ = quantised(run, images)
+        simulated = fine_tune.SimulatedNetwork(run.network, q.sigmas, q.scales())
+        x, stage = run.input(images), None
+        with torch.no_grad():
+            for name, got in zip(q.names, integer.IntegerNetwork(q.model).activations(images)):
+                kind, number = (name[:-1], int(name[-1])) if name != "heads" else (name, 0)
+                if kind in ("norm", "pool"):
+                    if kind == "norm" and f"pool{number}" in q.names:
+                        continue  # compared behind its pooling
+                    stage = simulated.convolved(number, x)
+                elif kind == "fc":
+                    stage = simulated.connected(number, x)
+                elif kind == "heads":
+                    exact = got.flatten(1).double() * torch.from_numpy(q.units["heads"])
+                    torch.testing.assert_close(simulated.heads(x).double(), exact, atol=1e-3, rtol=0)
+                    return
+                else:
+                    continue
+                off = (stage.flatten(1) / q.sigmas[name] - got.flatten(1)).abs()
+                self.assertLess(off.max(), 1.01, name)
+                self.assertLess((off > 0.5).double().mean(), 0.03, name)
+                x = (got * q.sigmas[name]).float()
+        self.fail("no heads")
+
+    def test_learns_with_its_weights_rounded(self):
+        images = np.stack([window(seed) for seed in range(4)])
+        run = random_run()
+        q, _ = quantised(run, images)
+        simulated = fine_tune.SimulatedNetwork(run.network, q.sigmas, q.scales()).train()
+        optimizer = torch.optim.Adam(simulated.parameters(), 1e-3)
+        x, present, losses = run.input(images), torch.tensor([0, 1, 1, 0]), []
+        for _ in range(12):
+            loss = F.cross_entropy(simulated(x)[0], present)
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+            losses.append(loss.item())
+        self.assertLess(losses[-1], 0.3 * losses[0])
+
+    def test_gradients_pass_rounding_but_not_the_ends(self):
+        x = torch.tensor([-200.0, -100.4, 0.3, 127.4, 127.6], requires_grad=True)
+        out = fine_tune._Rounded.apply(x, torch.tensor(1.0), -127)
+        out.sum().backward()
+        self.assertEqual(out.tolist(), [-127, -100, 0, 127, 127])
+        self.assertEqual(x.grad.tolist(), [0, 1, 1, 1, 0])
+
+
 class Weights(unittest.TestCase):
     def setUp(self):
         self.random = np.random.default_rng(4)
@@ -257,6 +312,19 @@ class Programs(unittest.TestCase):
             self.assertIn(words, model.notes)
         weighted = [line for line in self.said.splitlines() if line.startswith(("| conv", "| fc", "| heads"))]
         self.assertEqual(len(weighted), 8)
+
+    def test_fine_tuning_changes_weights_and_keeps_their_scales(self):
+        tuned = self.folder / "tuned.berthnet"
+        said = self.called(quantise.main, "quantise.py", self.folder / "run", "--calibrate", self.folder / "set", "-o", tuned,
+                           "--images", 12, "--search-images", 0, "--threads", 1, "--fine-tune", 3, "--learning-rate", 2e-2)
+        self.assertIn("Fine-tuning, 3 iterations: loss", said)
+        old, new = model_file.read(self.net), model_file.read(tuned)
+        self.assertIn("fine-tuned 3 iterations", new.notes)
+        for a, b in zip(old.layers, new.layers):
+            if hasattr(a, "multiplier"):
+                self.assertEqual(a.shift, b.shift)
+                self.assertFalse(np.array_equal(a.weights, b.weights))
+                self.assertLess(np.abs(a.weights.astype(int) - b.weights).mean(), 12)
 
     def test_quantising_twice_gives_the_same_bytes(self):
         again = self.folder / "again.berthnet"
