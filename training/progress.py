@@ -4,13 +4,14 @@ import time
 
 
 class Progress:
-    """progress(done) draws it; the line is cleared at the end."""
+    """progress(done) or progress(done, total) draws it; the line is cleared at the end."""
 
     def __init__(self, what, total, stream=sys.stderr):
         self.what, self.total, self.stream = what, max(1, total), stream
         self.start = time.monotonic()
 
-    def __call__(self, done):
+    def __call__(self, done, total=None):
+        self.total = total or self.total
         if not self.stream.isatty():
             return
         share, elapsed = done / self.total, time.monotonic() - self.start

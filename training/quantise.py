@@ -60,7 +60,7 @@ class Search:
             out[name] = out["conv" + name[4:]] if method == "same" else self.ranges.sigma(name, method)
         return out
 
-    def tried(self, methods, corrected=True):
+    def tried(self, methods, corrected=False):
         """(Quantised, Difference), or (None, None) where they do not fit."""
         try:
             quantised = self.builder.build(self.sigmas(methods))
@@ -77,33 +77,36 @@ class Search:
     def names(self):
         return [name for name in self.ranges.largest if name.startswith(("conv", "norm", "fc"))]
 
-    def best(self, corrected, report, progress=None):
+    def alternatives(self):
+        """(step, method) pairs worth a try. A normalisation that takes less than a tenth off keeps its input's sigma."""
+        largest = self.ranges.largest
+        for name in self.names():
+            if name.startswith("norm") and largest[name] > 0.9 * largest["conv" + name[4:]]:
+                continue
+            for method in METHODS:
+                yield name, method
+
+    def best(self, report, progress=None):
         """The methods by step that came out best: the best one for all, then layer by layer."""
         names, tries = self.names(), []
         for method in METHODS:
             methods = {name: "same" if name.startswith("norm") else method for name in names}
-            _, found = self.tried(methods, corrected)
+            _, found = self.tried(methods)
             report(f"| all {method} | {found or 'does not fit'} |")
             if found:
                 tries.append((found.error, methods, found))
         if not tries:
             raise DoesNotFit(f"{self.run.name}: no method fits all layers; is this run trained?")
         error, methods, found = min(tries, key=lambda one: one[0])
-        done, total = 0, len(names) * (len(METHODS) - 1)
-        for name in names:
-            for method in [*METHODS, *(["same"] if name.startswith("norm") else [])]:
-                if method == methods[name]:
-                    continue
-                changed = {**methods, name: method}
-                _, other = self.tried(changed, corrected)
-                if other and other.error < 0.99 * error:  # a hundredth is chance
-                    error, methods, found = other.error, changed, other
-                    report(f"| {name} {method} | {found} |")
-                done += 1
-                if progress:
-                    progress(min(done, total))
-        if progress:
-            progress(total)
+        alternatives = list(self.alternatives())
+        for k, (name, method) in enumerate(alternatives, 1):
+            changed = {**methods, name: method}
+            other = self.tried(changed)[1] if method != methods[name] else None
+            if other and other.error < 0.99 * error:  # a hundredth is chance
+                error, methods, found = other.error, changed, other
+                report(f"| {name} {method} | {found} |")
+            if progress:
+                progress(k, len(alternatives))
         return methods
 
 
@@ -164,7 +167,7 @@ def main():
     parser.add_argument("-o", "--output", required=True, metavar="NET.berthnet")
     parser.add_argument("--name", help="the network's name in the file (default: the run's)")
     parser.add_argument("--images", type=int, default=300, help="for the ranges")
-    parser.add_argument("--search-images", type=int, default=500,
+    parser.add_argument("--search-images", type=int, default=300,
                         help="for the choice of methods; 0: least squares everywhere")
     parser.add_argument("--fine-tune", type=int, default=0, metavar="N",
                         help="train on for N iterations with the integers' rounding, if too many decisions change")
@@ -185,17 +188,20 @@ def main():
         if len(for_search):
             print("\n| methods | changed against float |\n|---|---|", flush=True)
             search = Search(run, ranges, samples.images(for_search), samples.present[for_search] > 0)
-            bar = Progress("choosing", 1)
-            bar.total = len(search.names()) * (len(METHODS) - 1)
-            methods = search.best(True, lambda line: print(line, flush=True), bar)
-            print(f"| without bias correction | {search.tried(methods, False)[1]} |")
+            methods = search.best(lambda line: print(line, flush=True), Progress("choosing", 1))
             sigmas = search.sigmas(methods)
         else:
             methods = {n: "least squares" for n in ranges.largest if n.startswith(("conv", "norm", "fc"))}
             sigmas = {name: ranges.sigma(name, method) for name, method in methods.items()}
         name, notes = arguments.name or run.name, notes_of(run, arguments.calibrate)
         quantised = Builder(run, ranges).build(sigmas, name, notes)
+        plain = search.measured(quantised) if len(for_search) else None
         correct_biases(quantised, ranges)
+        if plain:
+            corrected = search.measured(quantised)
+            print(f"| biases corrected | {corrected} |", flush=True)
+            if corrected.error > plain.error:
+                quantised = Builder(run, ranges).build(sigmas, name, notes)
         if arguments.fine_tune:
             quantised = fine_tuned(run, quantised, samples, ranges.images, sigmas, arguments)
             if len(for_search):

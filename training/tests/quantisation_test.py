@@ -340,8 +340,9 @@ class Programs(unittest.TestCase):
         search.names = lambda: ["conv1", "norm1"]  # two layers are enough of a choice; the others stay
         rest = {name: "max" for name in ranges.largest if name.startswith(("conv", "norm", "fc"))}
         search.sigmas = lambda methods, whole=search.sigmas: whole({**rest, **methods})
+        self.assertEqual([name for name, _ in search.alternatives()], ["conv1"] * 4)  # alpha is small: norm1 stays
         lines = []
-        methods = search.best(False, lines.append)
+        methods = search.best(lines.append)
         best = search.tried(methods, False)[1].error
         for method in quantisation.METHODS:
             self.assertLessEqual(best, search.tried({"conv1": method, "norm1": "same"}, False)[1].error)
