@@ -120,7 +120,7 @@ def _convolve_shape(layer, shape, first):
     out, group_channels, kernel_height, kernel_width = layer.weights.shape
     _require(group_channels * layer.groups == channels,
              f"in_channels is {group_channels * layer.groups}, but there are {channels}")
-    _require(group_channels % 4 == 0 and out % layer.groups == 0 and out % 4 == 0,
+    _require(group_channels % 4 == 0 and out % (4 * layer.groups) == 0,
              f"{out} output channels, {group_channels} input channels a group: must be multiples of 4, and share out "
              f"evenly over {layer.groups} groups")
     _require(min(layer.stride) >= 1 and min(layer.pad) >= 0 and layer.pad[0] < kernel_height and
