@@ -98,6 +98,11 @@ class HostBackend final : public Backend {
     for (const Step& step : steps) {
       Call call{
           ops_.ops[static_cast<std::size_t>(step.op)], step.params, {}, (step.items + kGroupSize - 1) / kGroupSize};
+      if (call.op.parts != nullptr) {
+        const int parts = call.op.parts(step.params.data());
+        if (parts > 0) call.groups = parts;
+        if (parts == 0) call.op.run = call.op.other;
+      }
       for (Buffer* buffer : step.buffers) call.buffers.push_back(buffer->host());
       plan->calls.push_back(std::move(call));
     }

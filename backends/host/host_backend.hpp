@@ -15,6 +15,10 @@ struct HostOp {
   RunGroups run = nullptr;
   /// The function does the whole operation when called for group 0; it is called once.
   bool whole = false;
+  /// Into how many parts the work falls where they are not groups: `run` is called with parts then. 0 for parameters
+  /// that it cannot do, which `other` does by groups.
+  int (*parts)(const void* params) = nullptr;
+  RunGroups other = nullptr;
 };
 
 /// A table of operations by Op, filled by a CPU backend.

@@ -3,6 +3,7 @@
 #include <hwy/highway.h>
 
 #include "cpu/cpu_backend.hpp"
+#include "reference/reference.hpp"
 #include "signature.hpp"
 #include "simd_ops.hpp"
 
@@ -22,7 +23,35 @@ namespace berth::simd_backend {
   X(contour_collect)      \
   X(contour_trace)        \
   X(quad_fit)             \
-  X(edge_refine)
+  X(edge_refine)          \
+  X(max_pool)
+
+// Those that threads share.
+#define BERTH_SIMD_SHARED_OPS(X) \
+  X(convolve)                    \
+  X(local_response_norm)         \
+  X(fully_connected)
+
+namespace {
+
+// A part has the reference's arguments, then its bounds.
+template <class Reference>
+struct Parts;
+template <class P, class... T>
+struct Parts<void(const P&, T*...)> {
+  using Function = void (*)(const P&, T*..., int, int);
+
+  template <std::size_t... I>
+  static void run(Function function, const void* params, void* const* buffers, int first, int last,
+                  std::index_sequence<I...>) {
+    function(*static_cast<const P*>(params), static_cast<T*>(buffers[I])..., first, last);
+  }
+  static void run(Function function, const void* params, void* const* buffers, int first, int last) {
+    run(function, params, buffers, first, last, std::index_sequence_for<T...>{});
+  }
+};
+
+}  // namespace
 
 host::HostOps ops() {
   host::HostOps table = cpu_backend::ops();
@@ -31,6 +60,17 @@ host::HostOps ops() {
       [](const void* params, void* const* buffers, int, int) { signature::call(&simd_backend::op, params, buffers); }, \
       true};
   BERTH_SIMD_OPS(X)
+#undef X
+#define X(op)                                                                                         \
+  {                                                                                                   \
+    host::HostOp& entry = table.ops[static_cast<std::size_t>(Op::op)];                                \
+    entry.other = entry.run;                                                                          \
+    entry.run = [](const void* params, void* const* buffers, int first, int last) {                   \
+      Parts<decltype(reference::op)>::run(&simd_backend::op, params, buffers, first, last);           \
+    };                                                                                                \
+    entry.parts = [](const void* params) { return parts(*static_cast<const op##_params*>(params)); }; \
+  }
+  BERTH_SIMD_SHARED_OPS(X)
 #undef X
   return table;
 }

@@ -21,6 +21,26 @@ void contour_collect(const contour_collect_params& p, const u32* spans, const u3
 void contour_trace(const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points);
 void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads);
 void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* levels, const s32* quads, s32* edges);
+void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor);
+
+/// Operations that threads share, a part each: parts [first, last). How many parts there are is 0 for parameters that
+/// only the kernel text can do.
+constexpr int kMaxConvolveWords = 16384;
+inline int parts(const convolve_params& p) {  // rows of all output tensors
+  const bool fits = static_cast<long long>(p.width + 2 * p.pad_x) * p.words * p.kernel_height <= kMaxConvolveWords;
+  return fits && p.group_out_words % 2 == 0 ? p.count * p.out_height : 0;
+}
+void convolve(const convolve_params& p, const u32* tensor, const u32* weights, const s32* channels, u32* out_tensor,
+              int first, int last);
+
+constexpr int kMaxResponseChannels = 4096;
+inline int parts(const local_response_norm_params& p) { return p.words * 4 <= kMaxResponseChannels ? p.pixels : 0; }
+void local_response_norm(const local_response_norm_params& p, const u32* tensor, const s32* table, u32* out_tensor,
+                         int first, int last);
+
+inline int parts(const fully_connected_params& p) { return p.out_channels / 4; }  // output words, at every position
+void fully_connected(const fully_connected_params& p, const u32* tensor, const u32* weights, const s32* channels,
+                     u32* out_tensor, int first, int last);
 
 }  // namespace berth::simd_backend
 
