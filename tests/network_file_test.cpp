@@ -1,0 +1,150 @@
+// Network files: what is read is what was written, and whatever is wrong with one is said, never read past.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "berth/error.hpp"
+#include "crc32.hpp"
+#include "navigation/network.hpp"
+#include "support/scratch_folder.hpp"
+
+namespace berth {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+const char kTiny[] = BERTH_SOURCE_DIR "/training/tests/data/tiny.berthnet";
+
+using Bytes = std::vector<unsigned char>;
+
+Bytes tiny_bytes() {
+  std::ifstream file(kTiny, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+Network parse(const Bytes& bytes) { return parse_network(bytes.data(), bytes.size(), "it.berthnet"); }
+
+/// With a size and a CRC that fit what is there, so that a reader looks further.
+Bytes sealed(Bytes bytes) {
+  for (std::size_t i = 0; i < 4; ++i) bytes[12 + i] = static_cast<unsigned char>(bytes.size() >> (8 * i));
+  const u32 sum = crc32(bytes.data(), bytes.size() - 4);
+  for (std::size_t i = 0; i < 4; ++i) bytes[bytes.size() - 4 + i] = static_cast<unsigned char>(sum >> (8 * i));
+  return bytes;
+}
+
+TEST(NetworkFile, IsReadAndWrittenToTheByte) {
+  const Network network = read_network(kTiny);
+  EXPECT_EQ(network.side, 256);
+  EXPECT_TRUE(network.normalise);
+  EXPECT_GT(network.layers.size(), 3u);
+  EXPECT_GT(network.parameters(), 1000u);
+  EXPECT_EQ(network_bytes(network), tiny_bytes());
+}
+
+TEST(NetworkFile, ThatIsNotThereIsNamed) {
+  EXPECT_THAT([] { read_network("no/such.berthnet"); },
+              ThrowsMessage<Error>(HasSubstr("no/such.berthnet: No such file")));
+}
+
+TEST(NetworkFile, OfAnotherKindIsRefused) {
+  EXPECT_THAT([] { read_network(BERTH_SOURCE_DIR "/README.md"); }, ThrowsMessage<Error>(HasSubstr("not a network")));
+  EXPECT_THAT([] { parse({}); }, ThrowsMessage<Error>(HasSubstr("not a network")));
+}
+
+TEST(NetworkFile, OfAnotherVersionIsRefused) {
+  Bytes bytes = tiny_bytes();
+  bytes[8] = 2;
+  EXPECT_THAT([&] { parse(bytes); }, ThrowsMessage<Error>(HasSubstr("version 2; this Berth reads version 1")));
+}
+
+TEST(NetworkFile, CutOffAnywhereIsRefused) {
+  const Bytes whole = tiny_bytes();
+  for (std::size_t length = 0; length < whole.size(); length += 97) {
+    const Bytes part(whole.begin(), whole.begin() + static_cast<long>(length));
+    EXPECT_THROW(parse(part), Error) << length;
+    if (length >= 20) {
+      EXPECT_THROW(parse(sealed(part)), Error) << length << ", sealed again";
+    }
+  }
+}
+
+TEST(NetworkFile, WithAFlippedBitIsRefused) {
+  Bytes bytes = tiny_bytes();
+  bytes[bytes.size() / 2] ^= 4;
+  EXPECT_THAT([&] { parse(bytes); }, ThrowsMessage<Error>(HasSubstr("wrong CRC")));
+}
+
+TEST(NetworkFile, WithBytesAfterTheEndIsRefused) {
+  Bytes bytes = tiny_bytes();
+  bytes.insert(bytes.end() - 4, 3, 0);
+  EXPECT_THAT([&] { parse(sealed(bytes)); }, ThrowsMessage<Error>(HasSubstr("3 bytes follow the last field")));
+}
+
+/// Of a network changed by `change`, written and read.
+template <class Change>
+std::string refusal(Change change) {
+  Network network = read_network(kTiny);
+  change(network);
+  try {
+    parse(network_bytes(network));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "read";
+}
+
+TEST(NetworkFile, WhoseLayersDoNotFitNamesTheLayer) {
+  EXPECT_THAT(
+      refusal([](Network& n) { n.heads.in_channels -= 4, n.heads.weights.resize(n.heads.weights.size() - 20); }),
+      HasSubstr("it.berthnet: the heads: in_channels is"));
+  EXPECT_THAT(refusal([](Network& n) { std::get<ConvolveLayer>(n.layers[0]).shift = 31; }),
+              HasSubstr("layer 1: shift is 31, not within 0 to 30"));
+  EXPECT_THAT(refusal([](Network& n) { std::get<ConvolveLayer>(n.layers[0]).multipliers[0] = 32768; }),
+              HasSubstr("layer 1 (convolve): a multiplier of 32768"));
+  EXPECT_THAT(refusal([](Network& n) { std::get<ConvolveLayer>(n.layers[0]).bias[1] = 2147483647; }),
+              HasSubstr("layer 1 (convolve): the sum of channel 1 may leave 32 bits"));
+  EXPECT_THAT(refusal([](Network& n) { std::get<ConvolveLayer>(n.layers[0]).weights[0] = -128; }),
+              HasSubstr("layer 1 (convolve): a weight of -128"));
+  EXPECT_THAT(refusal([](Network& n) {
+                n.layers.insert(n.layers.begin(), MaxPoolLayer{64, 64}), n.side = 16;
+              }),
+              HasSubstr("layer 1 (max_pool): leaves nothing of a tensor of 16x4x4"));
+  EXPECT_THAT(refusal([](Network& n) { n.side = 258; }), HasSubstr("258 px, not a multiple of 4"));
+  EXPECT_THAT(refusal([](Network& n) { n.x.shift = 0; }), HasSubstr("an output's shift is 0"));
+}
+
+TEST(NetworkFile, OfAnUnknownLayerIsRefused) {
+  Bytes bytes = tiny_bytes();
+  const Network network = read_network(kTiny);
+  const std::size_t first_kind = 16 + 4 + network.name.size() + 4 + network.notes.size() + 12 + 4;
+  ASSERT_EQ(bytes[first_kind], 1);
+  bytes[first_kind] = 77;
+  EXPECT_THAT([&] { parse(sealed(bytes)); }, ThrowsMessage<Error>(HasSubstr("layer 1: kind 77 is unknown")));
+}
+
+// Any bytes, with a CRC that fits: a network that passes every check or an error; never a crash, never an endless read.
+TEST(NetworkFile, WithRandomDamageIsReadOrRefused) {
+  const Bytes whole = tiny_bytes();
+  std::mt19937 random(7);
+  int refused = 0;
+  for (int i = 0; i < 4000; ++i) {
+    Bytes bytes = whole;
+    const std::size_t near = i % 2 == 0 ? std::size_t{200} : bytes.size();  // where the shapes are, or anywhere
+    for (unsigned k = random() % 4; k < 4; ++k) bytes[random() % near] = static_cast<unsigned char>(random());
+    if (random() % 8 == 0) bytes.resize(20 + random() % (bytes.size() - 20));
+    try {
+      parse(sealed(bytes));
+    } catch (const Error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 1000);
+}
+
+}  // namespace
+}  // namespace berth
