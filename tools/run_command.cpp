@@ -16,9 +16,10 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
+  berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
   berth doctor                                   what this machine has, and what it lacks
 
-Exit codes: 0 all well; 1 verify found a difference, or a demo found nothing; 2 bad input or usage.)";
+Exit codes: 0 all well; 1 verify or eval found a difference, or a demo found nothing; 2 bad input or usage.)";
 
 }  // namespace
 
@@ -36,6 +37,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_run(app, console, exit_code);
   add_verify(app, console, exit_code);
   add_bench(app, console, exit_code);
+  add_eval(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.
   if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);
@@ -46,7 +48,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
     const std::string given = argc > 1 ? argv[1] : "";
     if (app.get_subcommands().empty() && !given.empty() && given[0] != '-') {
       console.complain("command line: field 'command' is '" + given +
-                       "'; use demo, detect, run, verify, bench or doctor");
+                       "'; use demo, detect, run, verify, bench, eval or doctor");
     } else {
       app.exit(error, console.out(), console.err());
     }
