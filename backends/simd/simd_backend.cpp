@@ -24,10 +24,12 @@ namespace berth::simd_backend {
   X(contour_trace)        \
   X(quad_fit)             \
   X(edge_refine)          \
+  X(normalize_window)     \
   X(max_pool)
 
 // Those that threads share.
 #define BERTH_SIMD_SHARED_OPS(X) \
+  X(extract_window)              \
   X(convolve)                    \
   X(local_response_norm)         \
   X(fully_connected)

@@ -21,10 +21,18 @@ void contour_collect(const contour_collect_params& p, const u32* spans, const u3
 void contour_trace(const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points);
 void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads);
 void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* levels, const s32* quads, s32* edges);
+void normalize_window(const normalize_window_params& p, const u32* pixels, const s32* statistics, u32* tensor);
 void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor);
 
 /// Operations that threads share, a part each: parts [first, last). How many parts there are is 0 for parameters that
 /// only the kernel text can do.
+constexpr int kMaxExtractColumns = 16384;
+inline int parts(const extract_window_params& p) {                                 // rows of all windows
+  return p.out_words <= kMaxExtractColumns / 40 - 1 ? p.count * p.out_height : 0;  // a pixel covers ten columns at most
+}
+void extract_window(const extract_window_params& p, const u32* pixels, const s32* windows, u32* out_pixels, int first,
+                    int last);
+
 constexpr int kMaxConvolveWords = 16384;
 inline int parts(const convolve_params& p) {  // rows of all output tensors
   const bool fits = static_cast<long long>(p.width + 2 * p.pad_x) * p.words * p.kernel_height <= kMaxConvolveWords;
