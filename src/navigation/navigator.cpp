@@ -77,7 +77,11 @@ struct Navigator::Impl {
   std::array<s32, 4> window_at(std::int64_t x_q16, std::int64_t y_q16, std::int64_t d_q16) const {
     const s32 wide = static_cast<s32>(std::clamp<std::int64_t>(d_q16 / 256 / kWindowDiameter, kMinStep, kMaxStep));
     const std::int64_t half = static_cast<std::int64_t>(network.side) * wide / 2;
-    return {static_cast<s32>(x_q16 / 256 + 128 - half), static_cast<s32>(y_q16 / 256 + 128 - half), wide, 0};
+    // On whole pixels of the frame: nothing is resampled where the scale is 1.
+    const auto corner = [half](std::int64_t at_q16) {
+      return static_cast<s32>((at_q16 / 256 + 128 - half) >> 8) * 256;
+    };
+    return {corner(x_q16), corner(y_q16), wide, 0};
   }
 
   void take(const NetworkOutput& output, const std::array<s32, 4>& window) {
