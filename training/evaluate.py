@@ -165,8 +165,11 @@ def report(results, threshold, others=None):
 
 def failures(navset, indices, results, threshold, most=96):
     """A picture of misses, then false positives, the worst first; or None."""
-    wrong = np.flatnonzero((results.score >= threshold) != results.present)
-    order = sorted(wrong, key=lambda i: (not results.present[i], -abs(results.score[i] - threshold)))[:most]
+    found = results.score >= threshold
+    misses = sorted(np.flatnonzero(~found & results.present), key=lambda i: results.score[i])
+    false = sorted(np.flatnonzero(found & ~results.present), key=lambda i: -results.score[i])
+    misses = misses[:max(most // 2, most - len(false))]
+    order = [*misses, *false[:most - len(misses)]]
     if not order:
         return None
     side, columns = contact_sheet.SIDE + 4, min(8, len(order))

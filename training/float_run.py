@@ -52,7 +52,7 @@ class FloatRun:
         heads = torch.cat([network.score(x), network.geometry(x)], 1)[:, :, None, None]
         yield Step("heads", heads, heads)
 
-    def outputs(self, images, batch=50, progress=None):
+    def outputs(self, images, batch=10, progress=None):
         """float64[n, 5]: two scores, three numbers of geometry."""
         out = []
         for first in range(0, len(images), batch):

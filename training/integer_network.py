@@ -191,9 +191,10 @@ class IntegerNetwork:
             pass
         return x.flatten(1).cpu().numpy().astype(np.int64)
 
-    def found(self, images, batch=25, progress=None):
-        """Found of any number of images, `batch` at a time; progress(done) after each."""
-        parts = []
+    def found(self, images, batch=None, progress=None):
+        """Found of any number of images, `batch` at a time; progress(done) after each. Without `batch`, what is fastest:
+        on a CPU few enough that activations stay in its caches (11 ms an image of lite by fours, 42 by twenty-fives)."""
+        parts, batch = [], batch or (4 if self.device == "cpu" else 200)
         for first in range(0, len(images), batch):
             parts.append(self.raw(images[first:first + batch]))
             if progress:

@@ -21,7 +21,7 @@ class Ranges:
     """What the activations of a float run are like on some images: greatest values and histograms a step, greatest
     value and mean before ReLU a channel."""
 
-    def __init__(self, run, images, batch=25):
+    def __init__(self, run, images, batch=4):
         self.largest, self.histogram, self.channel_largest, self.channel_mean = {}, {}, {}, {}
         self.run, self.images, self.batch = run, images, batch
         for step in self._steps():
@@ -173,26 +173,26 @@ class Builder:
         layers, names, units, values = [], [], {}, dict(sigmas)
         sigma, side = INPUT_SCALE, model_file.SIDE
 
-        def add(name, layer, unit=None):
-            names.append(name)
+        def add(step, layer, unit=None):
+            names.append(step)
             layers.append(layer)
-            values[name] = sigma
+            values[step] = sigma
             if unit is not None:
-                units[name] = unit
+                units[step] = unit
 
         for i, spec in enumerate(network.specs, 1):
-            name, stride, convert, bias_shift = f"conv{i}", (spec.stride, spec.stride), lambda weights: weights, 0.0
+            step, stride, convert, bias_shift = f"conv{i}", (spec.stride, spec.stride), lambda weights: weights, 0.0
             if i == 1:
-                words, step = (spec.kernel + 3) // 4, spec.stride // 4
-                if spec.pad or spec.stride % 4 or (side // 4 - words) // step != (side - spec.kernel) // spec.stride:
+                words, word_stride = (spec.kernel + 3) // 4, spec.stride // 4
+                if spec.pad or spec.stride % 4 or (side // 4 - words) // word_stride != (side - spec.kernel) // spec.stride:
                     raise DoesNotFit("conv1: only strides of 4, 8, ... without padding are taken four pixels a word")
-                stride, convert = (spec.stride, spec.stride // 4), folded_input
+                stride, convert = (spec.stride, word_stride), folded_input
                 # Integers take 128 off instead of the training mean, so that no pixel is clamped.
                 if not normalise:
-                    bias_shift = self._float(self.weights[name])[0].sum((1, 2, 3)) * (128 - self.run.mean) * INPUT_SCALE
-            weights, bias, multiplier, shift, unit = self._layer(name, sigma, sigmas[name], convert, bias_shift)
-            sigma = sigmas[name]
-            add(name, Convolve(weights, bias, multiplier, shift, stride, (spec.pad, spec.pad), spec.groups), unit)
+                    bias_shift = self._float(self.weights[step])[0].sum((1, 2, 3)) * (128 - self.run.mean) * INPUT_SCALE
+            weights, bias, multiplier, shift, unit = self._layer(step, sigma, sigmas[step], convert, bias_shift)
+            sigma = sigmas[step]
+            add(step, Convolve(weights, bias, multiplier, shift, stride, (spec.pad, spec.pad), spec.groups), unit)
             table = norm_table(sigma, sigmas[f"norm{i}"], network.lrn.alpha * 5)
             sigma = sigmas[f"norm{i}"]
             add(f"norm{i}", LocalResponseNorm(table))
@@ -202,12 +202,12 @@ class Builder:
                 side = (side - 3) // 2 + 1
         channels = network.specs[-1].channels
         for i in range(len(network.specs) + 1, len(network.specs) + 1 + len(network.hidden)):
-            name, shape = f"fc{i}", (channels, side, side)
+            step, shape = f"fc{i}", (channels, side, side)
             # torch flattens channels, rows, columns
             weights, bias, multiplier, shift, unit = self._layer(
-                name, sigma, sigmas[name], lambda w, shape=shape: w.reshape(-1, *shape).transpose(0, 2, 3, 1))
-            sigma = sigmas[name]
-            add(name, FullyConnected(weights, bias, multiplier, shift), unit)
+                step, sigma, sigmas[step], lambda w, shape=shape: w.reshape(-1, *shape).transpose(0, 2, 3, 1))
+            sigma = sigmas[step]
+            add(step, FullyConnected(weights, bias, multiplier, shift), unit)
             channels, side = len(weights), 1
         heads, unit = self._heads(sigma)
         add("heads", heads, unit)

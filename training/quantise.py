@@ -136,12 +136,13 @@ def layer_table(quantised, methods, noise):
 
 def notes_of(run, folders):
     """What the file says about its origin."""
-    trained = ", ".join(f"{m['set']} seed {m['seed']} ({m['image_hash']})" for m in run.settings.get("manifests", [])
-                        if "seed" in m) or "unknown sets"
-    calibrated = ", ".join(f"{m['set']} seed {m['seed']} ({m['image_hash']})"
-                           for m in (NavSet(folder).manifest for folder in folders) if "seed" in m)
+    def sets(manifests):
+        return ", ".join(f"{m['set']} seed {m['seed']} ({m['image_hash']})" for m in manifests if "seed" in m) or "unknown sets"
+
+    manifests = run.settings.get("manifests", [])  # of the training sets, then of the test's
+    trained, calibrated = sets(manifests[:-1] or manifests), sets(NavSet(folder).manifest for folder in folders)
     return (f"{run.settings['network']} of run {run.name}, iteration {run.iteration} of {run.settings['iterations']}, seed "
-            f"{run.settings['seed']}; trained on, last tested on: {trained}; calibrated on: {calibrated or 'unknown sets'}")
+            f"{run.settings['seed']}; trained on {trained}; calibrated on {calibrated}")
 
 
 def fine_tuned(run, quantised, samples, images, sigmas, arguments):

@@ -308,7 +308,8 @@ class Programs(unittest.TestCase):
 
     def test_quantising_writes_a_network_that_names_its_origin(self):
         model = model_file.read(self.net)
-        for words in ("run run", "iteration 7 of 9", "windows seed 5 (abc123)"):
+        self.assertEqual(model.name, "run")
+        for words in ("run run", "trained on windows seed 5 (abc123)", "calibrated on windows seed 5", "iteration 7 of 9", "windows seed 5 (abc123)"):
             self.assertIn(words, model.notes)
         weighted = [line for line in self.said.splitlines() if line.startswith(("| conv", "| fc", "| heads"))]
         self.assertEqual(len(weighted), 8)
