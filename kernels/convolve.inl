@@ -1,14 +1,18 @@
 // Convolution of s8 tensors with any kernel, stride, padding and groups; then bias, ReLU and requantisation.
 // An item makes one output word (four channels: sums a to d) of CONVOLVE_PIXELS neighbouring pixels, so that a kernel
-// tap's weights serve all of them. With a horizontal stride of 1 its pixels' input moves along by one word a tap.
+// tap's weights serve all of them. With a horizontal stride of 1 its pixels' input moves along by one word a tap; else
+// each tap reads its own. Memory is what costs: four weights and one to sixteen inputs for 256 products.
 // Bound: the model's exporter proves for each channel that its sum, bias and rounding stay below 2^31.
-#define CONVOLVE_EACH_PIXEL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7)
+#define CONVOLVE_EACH_PIXEL(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9) X(10) X(11) X(12) X(13) X(14) X(15)
 #define CONVOLVE_START(i) \
   s32 a##i = 0;           \
   s32 b##i = 0;           \
   s32 c##i = 0;           \
-  s32 d##i = 0;           \
-  u32 q##i = 0u;
+  s32 d##i = 0;
+#define CONVOLVE_LOAD(i)                                             \
+  u32 q##i = 0u;                                                     \
+  if (left + i * p.stride_x >= 0 && left + i * p.stride_x < p.width) \
+    q##i = tensor[row + (left + i * p.stride_x) * p.words];
 #define CONVOLVE_TAP(i)          \
   a##i = dot_s8(q##i, w0, a##i); \
   b##i = dot_s8(q##i, w1, b##i); \
@@ -40,13 +44,22 @@ BODY
       const int from_x = x * p.stride_x - p.pad_x;
       const int group = out_word / p.group_out_words * p.group_words;
       const int last_ky = min(p.kernel_height, p.height - from_y);
+      const int taps = p.stride_x == 1 ? p.kernel_width : 1;  // that share what is read
       CONVOLVE_EACH_PIXEL(CONVOLVE_START)
       for (int ky = max(0, -from_y); ky < last_ky; ++ky) {
-        const int row = (n * p.height + from_y + ky) * p.width * p.words + group;
         for (int word = 0; word < p.group_words; ++word) {
-          for (int kx = 0; kx < p.kernel_width; ++kx) {
-            const int first = kx > 0 && p.stride_x == 1 ? CONVOLVE_PIXELS - 1 : 0;
-            for (int i = first; i < CONVOLVE_PIXELS; ++i) {
+          const int row = (n * p.height + from_y + ky) * p.width * p.words + group + word;
+          for (int first_kx = 0; first_kx < p.kernel_width; first_kx += taps) {
+            const int left = from_x + first_kx;
+            CONVOLVE_EACH_PIXEL(CONVOLVE_LOAD)
+            for (int tap = 0; tap < taps; ++tap) {
+              const int weight =
+                  (((ky * p.kernel_width + first_kx + tap) * p.group_words + word) * p.out_words + out_word) * 4;
+              const u32 w0 = weights[weight];
+              const u32 w1 = weights[weight + 1];
+              const u32 w2 = weights[weight + 2];
+              const u32 w3 = weights[weight + 3];
+              CONVOLVE_EACH_PIXEL(CONVOLVE_TAP)
               q0 = q1;
               q1 = q2;
               q2 = q3;
@@ -54,16 +67,18 @@ BODY
               q4 = q5;
               q5 = q6;
               q6 = q7;
-              q7 = 0u;
-              const int at = from_x + i * p.stride_x + kx;
-              if (at >= 0 && at < p.width) q7 = tensor[row + at * p.words + word];
+              q7 = q8;
+              q8 = q9;
+              q9 = q10;
+              q10 = q11;
+              q11 = q12;
+              q12 = q13;
+              q13 = q14;
+              q14 = q15;
+              q15 = 0u;
+              const int next = left + tap + CONVOLVE_PIXELS;
+              if (tap + 1 < taps && next >= 0 && next < p.width) q15 = tensor[row + next * p.words];
             }
-            const int weight = (((ky * p.kernel_width + kx) * p.group_words + word) * p.out_words + out_word) * 4;
-            const u32 w0 = weights[weight];
-            const u32 w1 = weights[weight + 1];
-            const u32 w2 = weights[weight + 2];
-            const u32 w3 = weights[weight + 3];
-            CONVOLVE_EACH_PIXEL(CONVOLVE_TAP)
           }
         }
       }

@@ -245,7 +245,7 @@ struct fully_connected_params {
 
 /* Neighbouring output pixels that an item of convolve makes, of one word: a launch has count * out_height *
    ceil(out_width / CONVOLVE_PIXELS) * out_words items. */
-#define CONVOLVE_PIXELS 8
+#define CONVOLVE_PIXELS 16
 
 /* Output words, and positions, that a work-group of fully_connected makes: a launch has ceil(out_channels / 4 /
    FULLY_CONNECTED_WORDS) * ceil(count * grid_height * grid_width / FULLY_CONNECTED_POSITIONS) groups. */

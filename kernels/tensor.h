@@ -1,7 +1,7 @@
 // What the network's operations share: sums of s8 products and their requantisation.
 
-// acc + the products of four s8 each, the words' bytes.
-#ifndef BERTH_DOT_S8
+// acc + the products of the words' four s8.
+#ifndef BERTH_DOT_S8  // the prelude's own
 FN s32 dot_s8(u32 a, u32 b, s32 acc) {
   return acc + (S32(a << 24) >> 24) * (S32(b << 24) >> 24) + (S32(a << 16) >> 24) * (S32(b << 16) >> 24) +
          (S32(a << 8) >> 24) * (S32(b << 8) >> 24) + (S32(a) >> 24) * (S32(b) >> 24);

@@ -55,3 +55,13 @@ static inline __device__ void atomicMin(u32* x, u32 v) { __nvvm_atom_min_gen_ui(
 
 #define U32(x) ((u32)(x))
 #define S32(x) ((s32)(x))
+
+// From compute capability 6.1 on one instruction is dot_s8 of tensor.h.
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 610
+#define BERTH_DOT_S8
+FN s32 dot_s8(u32 a, u32 b, s32 acc) {
+  s32 sum;
+  asm("dp4a.s32.s32 %0, %1, %2, %3;" : "=r"(sum) : "r"(a), "r"(b), "r"(acc));
+  return sum;
+}
+#endif
