@@ -111,9 +111,9 @@ TEST(NetworkFile, WhoseLayersDoNotFitNamesTheLayer) {
   EXPECT_THAT(refusal([](Network& n) { std::get<ConvolveLayer>(n.layers[0]).weights[0] = -128; }),
               HasSubstr("layer 1 (convolve): a weight of -128"));
   EXPECT_THAT(refusal([](Network& n) {
-                n.layers.insert(n.layers.begin(), MaxPoolLayer{64, 64}), n.side = 16;
+                n.layers.insert(n.layers.begin(), MaxPoolLayer{3, 2});
               }),
-              HasSubstr("layer 1 (max_pool): leaves nothing of a tensor of 16x4x4"));
+              HasSubstr("layer 1 (max_pool): comes before any convolution"));
   EXPECT_THAT(refusal([](Network& n) { n.side = 258; }), HasSubstr("258 px, not a multiple of 4"));
   EXPECT_THAT(refusal([](Network& n) { n.x.shift = 0; }), HasSubstr("an output's shift is 0"));
 }

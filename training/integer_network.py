@@ -42,10 +42,10 @@ def interpolated(table):
 
 
 def multiplied(values, multiplier, shift):
-    """Mul of the document. values s64; (v * M + 2^(k-1)) >> k."""
+    """Mul of the document. values s64; (v * M + 2^(k-1)) >> k, held to +-2^30."""
     values = np.asarray(values, np.int64)
     assert values.size == 0 or int(np.abs(values).max()) * multiplier + (1 << (shift - 1)) < 2**63
-    return (values * multiplier + (1 << (shift - 1))) >> shift
+    return np.clip((values * multiplier + (1 << (shift - 1))) >> shift, -(1 << 30), 1 << 30)
 
 
 def exp2_q16(exponent):

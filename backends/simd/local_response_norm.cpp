@@ -1,5 +1,4 @@
-#include <algorithm>
-#include <array>
+#include <cstdint>
 
 #include "simd/simd_ops.hpp"
 
@@ -17,44 +16,127 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr std::size_t kKnots = 104;
 
-/// The table and what each knot is below the next.
+/// Knots of the table's first segment, every 32 up to 2048: as bytes, for look-ups within registers.
+constexpr std::size_t kNear = 64;
+
 struct Table {
-  std::array<s32, kKnots> value;
-  std::array<s32, kKnots> rise;
+  s32 value[kKnots];
+  s32 rise[kKnots];  // to the next knot
+  bool near_fits;    // every rise of the first segment fits a byte
+  HWY_ALIGN u8 near_low[kNear];
+  HWY_ALIGN u8 near_high[kNear];
+  HWY_ALIGN u8 near_rise[kNear];
 };
 
-/// Outputs of the channels from `c`, eight at most, from their activations and the sums of five half squares.
+void prepare(const s32* knots, Table& table) {
+  table.near_fits = true;
+  for (std::size_t i = 0; i < kKnots; ++i) {
+    table.value[i] = knots[i];
+    table.rise[i] = i + 1 < kKnots ? knots[i + 1] - knots[i] : 0;
+    if (i >= kNear) continue;
+    table.near_fits = table.near_fits && table.rise[i] >= -128 && table.rise[i] <= 127;
+    table.near_low[i] = static_cast<u8>(knots[i] & 255);
+    table.near_high[i] = static_cast<u8>(knots[i] >> 8);
+    table.near_rise[i] = static_cast<u8>(table.rise[i] & 255);
+  }
+}
+
+/// Outputs from activations and the sums of five half squares.
 template <class D>
 HWY_INLINE hn::Vec<D> responses(D d, const Table& table, hn::Vec<D> a, hn::Vec<D> sum) {
   const auto near = hn::Lt(sum, hn::Set(d, 2048));
   const auto knot = hn::IfThenElse(near, hn::ShiftRight<5>(sum), hn::Add(hn::ShiftRight<10>(sum), hn::Set(d, 62)));
   const auto part = hn::IfThenElse(near, hn::ShiftLeft<3>(hn::And(sum, hn::Set(d, 31))),
                                    hn::ShiftRight<2>(hn::And(sum, hn::Set(d, 1023))));
-  const auto value = hn::GatherIndex(d, table.value.data(), knot);
-  const auto rise = hn::GatherIndex(d, table.rise.data(), knot);
+  const auto value = hn::GatherIndex(d, table.value, knot);
+  const auto rise = hn::GatherIndex(d, table.rise, knot);
   const auto factor = hn::Add(value, hn::ShiftRight<8>(hn::Add(hn::Mul(rise, part), hn::Set(d, 128))));
   const auto scaled = hn::ShiftRight<14>(hn::Add(hn::Mul(a, factor), hn::Set(d, 8192)));
   return hn::Min(scaled, hn::Set(d, 127));
 }
 
-/// One pixel's channels: `squares` is room for them and two zeros before and after.
-void pixel_responses(const Table& table, const signed char* in, int channels, s32* squares, signed char* out) {
+using Squares = std::uint16_t;
+
+template <class D>
+HWY_INLINE hn::Vec<D> sum_of_five(D d, const Squares* squares) {
+  auto sum = hn::LoadU(d, squares);
+  for (int k = 1; k < 5; ++k) sum = hn::Add(sum, hn::LoadU(d, squares + k));
+  return sum;
+}
+
+/// The same for channels one register of s32 at a time, then one by one.
+void responses_by_gathers(const Table& table, const signed char* in, int first, int last, const Squares* squares,
+                          signed char* out) {
   const hn::ScalableTag<s32> d;
   const hn::Rebind<signed char, decltype(d)> bytes;
+  const hn::Rebind<Squares, decltype(d)> halves;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int c = 0; c < channels; ++c) squares[c + 2] = in[c] * in[c] >> 1;
-  int c = 0;
-  for (; c + lanes <= channels; c += lanes) {
+  int c = first;
+  for (; c + lanes <= last; c += lanes) {
     const auto a = hn::PromoteTo(d, hn::LoadU(bytes, in + c));
-    auto sum = hn::LoadU(d, squares + c);
-    for (int k = 1; k < 5; ++k) sum = hn::Add(sum, hn::LoadU(d, squares + c + k));
+    const auto sum = hn::PromoteTo(d, sum_of_five(halves, squares + c));
     hn::StoreU(hn::DemoteTo(bytes, responses(d, table, a, sum)), bytes, out + c);
   }
   const hn::CappedTag<s32, 1> one;
-  for (; c < channels; ++c) {
+  for (; c < last; ++c) {
     const s32 sum = squares[c] + squares[c + 1] + squares[c + 2] + squares[c + 3] + squares[c + 4];
     out[c] = static_cast<signed char>(hn::GetLane(responses(one, table, hn::Set(one, in[c]), hn::Set(one, sum))));
   }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+/// Bytes of a table of 64 by the low six bits of 16-bit lanes, in their low bytes; the high ones are anything.
+template <class D>
+HWY_INLINE hn::Vec<D> look_up(D d, const u8* table, hn::Vec<D> index) {
+  const hn::Repartition<u8, D> bytes;
+  const auto at = hn::BitCast(bytes, hn::And(index, hn::Set(d, 15)));
+  const auto quarter = [&](int k) { return hn::TableLookupBytes(hn::LoadDup128(bytes, table + 16 * k), at); };
+  const auto odd =
+      hn::MaskFromVec(hn::BitCast(bytes, hn::Sub(hn::Zero(d), hn::And(hn::ShiftRight<4>(index), hn::Set(d, 1)))));
+  const auto upper = hn::MaskFromVec(hn::BitCast(bytes, hn::Sub(hn::Zero(d), hn::ShiftRight<5>(index))));
+  return hn::BitCast(d, hn::IfThenElse(upper, hn::IfThenElse(odd, quarter(3), quarter(2)),
+                                       hn::IfThenElse(odd, quarter(1), quarter(0))));
+}
+
+/// Outputs where no activation is negative and every sum is below 2048.
+template <class D>
+HWY_INLINE hn::Vec<D> near_responses(D d, const Table& table, hn::Vec<D> a, hn::Vec<D> sum) {
+  const hn::RebindToSigned<D> s;
+  const auto knot = hn::ShiftRight<5>(sum);
+  const auto value = hn::Or(hn::And(look_up(d, table.near_low, knot), hn::Set(d, 255)),
+                            hn::ShiftLeft<8>(look_up(d, table.near_high, knot)));
+  const auto rise = hn::ShiftRight<8>(hn::BitCast(s, hn::ShiftLeft<8>(look_up(d, table.near_rise, knot))));
+  const auto part = hn::BitCast(s, hn::ShiftLeft<3>(hn::And(sum, hn::Set(d, 31))));
+  const auto factor =
+      hn::Add(value, hn::BitCast(d, hn::ShiftRight<8>(hn::Add(hn::Mul(rise, part), hn::Set(s, std::int16_t{128})))));
+  // (a factor + 2^13) >> 14, from the product's halves.
+  const auto low = hn::Mul(a, factor);
+  const auto scaled = hn::Add(hn::Add(hn::ShiftLeft<2>(hn::MulHigh(a, factor)), hn::ShiftRight<14>(low)),
+                              hn::And(hn::ShiftRight<13>(low), hn::Set(d, 1)));
+  return hn::Min(scaled, hn::Set(d, 127));
+}
+#endif
+
+/// One pixel's channels: `squares` is room for them and two zeros before and after.
+void pixel_responses(const Table& table, const signed char* in, int channels, Squares* squares, signed char* out) {
+  for (int c = 0; c < channels; ++c) squares[c + 2] = static_cast<Squares>(in[c] * in[c] >> 1);
+  int c = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::ScalableTag<Squares> d;
+  const hn::RebindToSigned<decltype(d)> s;
+  const hn::Rebind<signed char, decltype(d)> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  for (; table.near_fits && c + lanes <= channels; c += lanes) {
+    const auto a = hn::BitCast(d, hn::PromoteTo(s, hn::LoadU(bytes, in + c)));
+    const auto sum = sum_of_five(d, squares + c);
+    if (hn::AllTrue(d, hn::Eq(hn::Or(hn::ShiftRight<11>(sum), hn::ShiftRight<15>(a)), hn::Zero(d)))) {
+      hn::StoreU(hn::DemoteTo(bytes, hn::BitCast(s, near_responses(d, table, a, sum))), bytes, out + c);
+    } else {
+      responses_by_gathers(table, in, c, c + lanes, squares, out);
+    }
+  }
+#endif
+  responses_by_gathers(table, in, c, channels, squares, out);
 }
 
 }  // namespace
@@ -62,11 +144,9 @@ void pixel_responses(const Table& table, const signed char* in, int channels, s3
 void local_response_norm(const local_response_norm_params& p, const u32* tensor, const s32* table, u32* out_tensor,
                          int first, int last) {
   const int channels = p.words * 4;
-  Table knots{};
-  std::copy_n(table, kKnots, knots.value.begin());
-  for (std::size_t i = 0; i + 1 < kKnots; ++i) knots.rise[i] = table[i + 1] - table[i];
-  s32 squares[kMaxResponseChannels + 4] = {};
-  std::fill_n(squares + channels + 2, 2, 0);
+  Table knots;
+  prepare(table, knots);
+  Squares squares[kMaxResponseChannels + 4] = {};
   for (int pixel = first; pixel < last; ++pixel) {
     const std::size_t at = static_cast<std::size_t>(pixel) * static_cast<std::size_t>(p.words);
     pixel_responses(knots, reinterpret_cast<const signed char*>(tensor + at), channels, squares,

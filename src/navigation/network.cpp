@@ -81,8 +81,12 @@ class Check {
     sums(layer.weights, layer.bias, layer.shift);
     multipliers(layer.multipliers);
   }
-  void values(const LocalResponseNormLayer&) const {}
-  void values(const MaxPoolLayer&) const {}
+  void values(const LocalResponseNormLayer&) const { not_first(); }
+  void values(const MaxPoolLayer&) const { not_first(); }
+  /// The input may be negative, activations not.
+  void not_first() const {
+    if (largest_ == 128) fail("comes before any convolution");
+  }
   void values(const FullyConnectedLayer& layer) const {
     channels(layer.in_channels);
     sums(layer.weights, layer.bias, layer.shift);
@@ -115,7 +119,10 @@ class Check {
 }  // namespace
 
 s32 FixedScale::apply(s32 value) const {
-  return static_cast<s32>((static_cast<std::int64_t>(value) * multiplier + (std::int64_t{1} << (shift - 1))) >> shift);
+  constexpr std::int64_t kMost = 1 << 30;
+  const std::int64_t scaled =
+      (static_cast<std::int64_t>(value) * multiplier + (std::int64_t{1} << (shift - 1))) >> shift;
+  return static_cast<s32>(std::clamp(scaled, -kMost, kMost));
 }
 
 std::vector<Shape> Network::shapes(int height, int width) const {

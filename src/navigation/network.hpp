@@ -67,7 +67,7 @@ struct Heads {
   std::vector<s32> bias;
 };
 
-/// (v * multiplier + 2^(shift - 1)) >> shift, in 64 bits.
+/// (v * multiplier + 2^(shift - 1)) >> shift, in 64 bits, held to ±2^30.
 struct FixedScale {
   s32 multiplier = 0;
   int shift = 1;

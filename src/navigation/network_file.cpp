@@ -272,7 +272,7 @@ Network parse_network(const unsigned char* bytes, std::size_t count, const std::
   network.mean = in.within("the mean", 0, 255);
   read_layers(in, network);
   for (FixedScale* scale : {&network.score, &network.x, &network.y, &network.d}) {
-    scale->multiplier = in.number();
+    scale->multiplier = in.within("an output's multiplier", 0, 2147483647);
     scale->shift = in.within("an output's shift", 1, 62);
   }
   in.left_for(network.logistic.size() * 2);
