@@ -8,7 +8,7 @@ Place place_in_frame(const NetworkOutput& output, const s32* window, int from_x,
   // The middle of window pixel u lies at corner + (u + 1/2) step - 1/2 frame pixels.
   const std::int64_t step = window[2];
   const auto in_frame = [step](std::int64_t at_q16, s32 corner) {
-    return (static_cast<std::int64_t>(corner) << 8) + ((at_q16 + 32768) * step >> 8) - 32768;
+    return static_cast<std::int64_t>(corner) * 256 + ((at_q16 + 32768) * step >> 8) - 32768;
   };
   return {in_frame(output.x_q16 + (static_cast<std::int64_t>(from_x) << 16), window[0]),
           in_frame(output.y_q16 + (static_cast<std::int64_t>(from_y) << 16), window[1]),
