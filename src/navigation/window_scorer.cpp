@@ -16,7 +16,6 @@ std::size_t pixels_of(const Network& network, int count) {
 WindowScorer::WindowScorer(Backend& backend, const Network& network, int batch)
     : network_(network),
       device_(backend, network),
-      batch_(batch),
       frame_(backend.make_buffer(pixels_of(network, batch))),
       plan_(device_, {frame_.get(), network.side, network.side * batch, network.side}, batch, network.side,
             network.side),

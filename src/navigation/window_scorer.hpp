@@ -25,7 +25,6 @@ class WindowScorer {
  private:
   const Network& network_;
   DeviceNetwork device_;
-  int batch_;
   std::unique_ptr<Buffer> frame_;
   NetworkPlan plan_;
   std::unique_ptr<Stream> stream_;
