@@ -247,13 +247,12 @@ TEST_P(CudaDriver, ReplaysAPlanAsOftenAsAsked) {
 TEST_P(CudaDriver, TimesEachStep) {
   const std::unique_ptr<Backend> backend = open({});
   const std::unique_ptr<Stream> stream = backend->make_stream();
-  const std::unique_ptr<Buffer> buffer = backend->make_buffer(4 * 400000);
-  const std::unique_ptr<Plan> plan = backend->record(
-      {make_step(scan_params{0, 3}, {buffer.get()}, 0), make_step(scan_params{0, 399999}, {buffer.get()}, 1)});
-  const std::vector<std::int64_t> times = stream->time_steps(*plan);
-  ASSERT_EQ(times.size(), 2u);
-  EXPECT_GT(times[1], 10000) << "400,000 additions";
-  EXPECT_LT(times[0], times[1]) << "nothing to do";
+  const std::unique_ptr<Buffer> buffer = backend->make_buffer(16);
+  const std::unique_ptr<Plan> plan = backend->record({make_step(scan_params{0, 3}, {buffer.get()}, 1),
+                                                      make_step(scan_params{0, 3}, {buffer.get()}, 0),
+                                                      make_step(scan_params{0, 3}, {buffer.get()}, 1)});
+  constexpr std::int64_t kMs = 1000000;  // this driver's clock: a work-group takes one
+  EXPECT_EQ(stream->time_steps(*plan), (std::vector<std::int64_t>{kMs, 0, kMs}));
   EXPECT_TRUE(stream->finish());
 }
 

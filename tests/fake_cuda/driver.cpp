@@ -356,7 +356,7 @@ DRIVER cuEventRecord(CUevent event, CUstream stream) {
   if (recorded->timed) {
     machine().enqueue(queue, [recorded] {
       const Lock at_work(machine().mutex);
-      recorded->when = std::chrono::steady_clock::now();
+      recorded->when_ms = machine().clock_ms;
     });
   }
   recorded->queue = queue;
@@ -382,7 +382,7 @@ static CUresult elapsed(const char* function, float* ms, CUevent from, CUevent t
       return machine().complain(kInvalidHandle, std::string(function) + ": no time was taken");
     }
   }
-  *ms = std::chrono::duration<float, std::milli>(last->when - first->when).count();
+  *ms = static_cast<float>(last->when_ms - first->when_ms);
   return kSuccess;
 }
 #if FAKE_CUDA_VERSION >= 12

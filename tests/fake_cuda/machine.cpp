@@ -157,6 +157,7 @@ void Machine::run(const Kernel& kernel) {
       buffers.push_back(memory(buffer, 1, "a kernel that runs"));
       if (buffers.back() == nullptr) return;
     }
+    clock_ms += kernel.groups;
   }
   ops_.ops[static_cast<std::size_t>(kernel.op)].run(kernel.params.data(), buffers.data(), 0,
                                                     static_cast<int>(kernel.groups));
