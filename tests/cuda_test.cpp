@@ -248,9 +248,9 @@ TEST_P(CudaDriver, TimesEachStep) {
   const std::unique_ptr<Backend> backend = open({});
   const std::unique_ptr<Stream> stream = backend->make_stream();
   const std::unique_ptr<Buffer> buffer = backend->make_buffer(16);
-  const std::unique_ptr<Plan> plan = backend->record({make_step(scan_params{0, 3}, {buffer.get()}, 1),
-                                                      make_step(scan_params{0, 3}, {buffer.get()}, 0),
-                                                      make_step(scan_params{0, 3}, {buffer.get()}, 1)});
+  const std::unique_ptr<Plan> plan =
+      backend->record({make_step(scan_params{0, 3}, {buffer.get()}, 1), make_step(scan_params{0, 3}, {buffer.get()}, 0),
+                       make_step(scan_params{0, 3}, {buffer.get()}, 1)});
   constexpr std::int64_t kMs = 1000000;  // this driver's clock: a work-group takes one
   EXPECT_EQ(stream->time_steps(*plan), (std::vector<std::int64_t>{kMs, 0, kMs}));
   EXPECT_TRUE(stream->finish());
