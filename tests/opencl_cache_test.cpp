@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "berth/error.hpp"
+#include "crc32.hpp"
 #include "kernel_text.hpp"
 #include "opencl/opencl.hpp"
 #include "opencl/program.hpp"

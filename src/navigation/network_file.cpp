@@ -4,6 +4,7 @@
 
 #include "berth/error.hpp"
 #include "crc32.hpp"
+#include "little_endian.hpp"
 #include "navigation/network.hpp"
 #include "navigation/network_check.hpp"
 
@@ -31,11 +32,7 @@ class Reader {
   [[noreturn]] void fail(const std::string& what) const {
     throw Error(file_ + (where.empty() ? "" : ": " + where) + ": " + what + "; export the network again");
   }
-  u32 word() {
-    const unsigned char* b = take(4);
-    return static_cast<u32>(b[0]) | static_cast<u32>(b[1]) << 8 | static_cast<u32>(b[2]) << 16 |
-           static_cast<u32>(b[3]) << 24;
-  }
+  u32 word() { return read_le32(take(4)); }
   s32 number() {
     const u32 value = word();
     s32 result = 0;
@@ -187,9 +184,7 @@ void read_layers(Reader& in, Network& network) {
 /// Puts fields behind each other.
 class Writer {
  public:
-  void word(u32 value) {
-    for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<unsigned char>(value >> shift));
-  }
+  void word(u32 value) { append_le32(bytes, value); }
   void number(s32 value) { word(static_cast<u32>(value)); }
   void numbers(std::initializer_list<s32> values) {
     for (const s32 value : values) number(value);
@@ -233,26 +228,22 @@ class Writer {
   std::vector<unsigned char> bytes;
 };
 
-u32 word_at(const unsigned char* b) {
-  return static_cast<u32>(b[0]) | static_cast<u32>(b[1]) << 8 | static_cast<u32>(b[2]) << 16 |
-         static_cast<u32>(b[3]) << 24;
-}
-
 void check_frame(const unsigned char* bytes, std::size_t count, const std::string& name) {
   if (count < kHeaderBytes + 4 || std::memcmp(bytes, kMagic, sizeof kMagic) != 0) {
     throw Error(name + ": not a network (.berthnet) file");
   }
-  const u32 version = word_at(bytes + sizeof kMagic);
+  const u32 version = read_le32(bytes + sizeof kMagic);
   if (version != kVersion) {
     throw Error(name + ": version " + std::to_string(version) + "; this Berth reads version " +
                 std::to_string(kVersion) + ": export the network again");
   }
-  const u32 said = word_at(bytes + sizeof kMagic + 4);
+  const u32 said = read_le32(bytes + sizeof kMagic + 4);
   if (said != count) {
     throw Error(name + ": has " + std::to_string(count) + " bytes, not the " + std::to_string(said) +
                 " it says: copy it again");
   }
-  if (word_at(bytes + count - 4) != crc32(bytes, count - 4)) throw Error(name + ": damaged (wrong CRC): copy it again");
+  if (read_le32(bytes + count - 4) != crc32(bytes, count - 4))
+    throw Error(name + ": damaged (wrong CRC): copy it again");
 }
 
 struct CloseFile {
