@@ -119,7 +119,7 @@ std::unique_ptr<Backend> open_backend(const std::string& name, const BackendOpti
 
 template <class P>
 Step make_step(const P& params, std::initializer_list<Buffer*> buffers, int items) {
-  static_assert(sizeof(P) <= 128, "Vulkan promises 128 bytes of push constants");
+  static_assert(sizeof(P) + sizeof(int) <= 128, "Vulkan promises 128 bytes of push constants; the groups follow");
   return make_step(OpOf<P>::value, &params, buffers, items);
 }
 
