@@ -13,6 +13,7 @@
 #include "engine.hpp"
 #include "frame/traffic.hpp"
 #include "frame_json.hpp"
+#include "quantile.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
 
@@ -42,11 +43,6 @@ struct BenchCommand {
 /// stream is taken to cost there. What its 256 cores at 998 MHz add in arithmetic is not in it.
 constexpr double kTx1BytesPerNs = 25.6;
 constexpr double kTx1LaunchNs = 5000;
-
-double quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
-}
 
 struct BenchFrame {
   std::string name;

@@ -7,29 +7,24 @@
 #include <functional>
 #include <map>
 
+#include "quantile.hpp"
+
 namespace berth::cli {
 namespace {
 
 double share(int part, int whole) { return whole == 0 ? 0 : 100.0 * part / whole; }
 
-double quantile(std::vector<double> values, double at) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(at * static_cast<double>(values.size() - 1) + 0.5)];
-}
-
 /// Decisions of each group of images, by the group's name in order.
 std::string grouped(const std::string& title, const std::vector<Judged>& images, int threshold,
                     const std::function<std::string(const LabelledImage&)>& group) {
-  std::map<std::string, std::vector<Judged>> groups;
+  std::map<std::string, Decisions> groups;
   for (const Judged& image : images) {
     const std::string name = group(image.truth);
-    if (!name.empty()) groups[name].push_back(image);
+    if (!name.empty()) groups[name].count(image, threshold);
   }
   std::string text =
       fmt::format("\n| {} | present | missed | % | absent | false | % |\n|---|---|---|---|---|---|---|\n", title);
-  for (const auto& [name, members] : groups) {
-    const Decisions d = decide(members, threshold);
+  for (const auto& [name, d] : groups) {
     text += fmt::format("| {} | {} | {} | {:.2f} | {} | {} | {:.2f} |\n", name, d.present(), d.missed,
                         share(d.missed, d.present()), d.absent(), d.false_found, share(d.false_found, d.absent()));
   }
@@ -53,14 +48,14 @@ std::string hidden_of(const LabelledImage& image) {
 
 }  // namespace
 
+void Decisions::count(const Judged& image, int threshold_q15) {
+  const bool found = image.output.score_q15 >= threshold_q15;
+  (image.truth.present ? found ? right_found : missed : found ? false_found : right_absent)++;
+}
+
 Decisions decide(const std::vector<Judged>& images, int threshold_q15) {
   Decisions decisions;
-  for (const Judged& image : images) {
-    const bool found = image.output.score_q15 >= threshold_q15;
-    (image.truth.present ? found ? decisions.right_found : decisions.missed
-     : found             ? decisions.false_found
-                         : decisions.right_absent)++;
-  }
+  for (const Judged& image : images) decisions.count(image, threshold_q15);
   return decisions;
 }
 

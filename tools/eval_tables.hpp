@@ -21,6 +21,7 @@ struct Decisions {
   int false_found = 0;
   int right_absent = 0;
 
+  void count(const Judged& image, int threshold_q15);
   int present() const { return right_found + missed; }
   int absent() const { return false_found + right_absent; }
   int all() const { return present() + absent(); }
