@@ -6,6 +6,7 @@
 
 #include "berth/error.hpp"
 #include "berth/marker.hpp"
+#include "divide_up.hpp"
 
 namespace berth {
 namespace {
@@ -31,7 +32,6 @@ constexpr normalize_params kNormalizeHalf = {kHistogramGroups, 10, 990, 250, 40,
 constexpr int kMiddle = 128;
 constexpr int kDark = 80;
 
-int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 int clamp(long long value, int low, int high) {
   return static_cast<int>(std::max<long long>(low, std::min<long long>(high, value)));
 }
@@ -92,7 +92,8 @@ MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capaciti
   totals_at = run_groups * kGroupSize;
 }
 
-MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config) : backend_(backend) {
+MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config)
+    : backend_(backend), buffers_(backend) {
   const MarkerGeometry whole(width, height, config.capacities);
   const MarkerGeometry half((width + 1) / 2, (height + 1) / 2, config.capacities);
   searches_ = {
@@ -100,7 +101,7 @@ MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorCo
       {"half_", {{"half_run_ends", "half_contours", "half_points"}}, half, 2, nullptr, nullptr, nullptr},
       {"dark_", {{"dark_run_ends", "dark_contours", "dark_points"}}, half, 2, nullptr, nullptr, nullptr},
   };
-  frame_ = make(whole.frame_bytes() / 4);
+  frame_ = buffers_.make(whole.frame_bytes() / 4);
   Buffer* pixels = config.flat_field.empty() ? frame_ : add_flat_field(config.flat_field);
   add_search(0, kMiddle, pixels, add_tiles(0, pixels, kNormalizeWhole), pixels, config);
   Buffer* half_pixels = add_halve(pixels);
@@ -110,20 +111,13 @@ MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorCo
   plan_ = backend_.record(steps_);
 }
 
-Buffer* MarkerPlan::make(std::size_t words) {
-  buffers_.push_back(backend_.make_buffer(words * 4));
-  return buffers_.back().get();
-}
-
 Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
   const MarkerGeometry& g = geometry();
   const std::vector<u32> packed = pack_gains(gains, g);
-  Buffer* buffer = make(packed.size());
-  const std::unique_ptr<Stream> stream = backend_.make_stream();
-  stream->upload(*buffer, packed.data(), packed.size() * 4);
-  stream->finish();
+  Buffer* buffer = buffers_.make(packed.size());
+  upload_at_start(backend_, *buffer, packed.data(), packed.size() * 4);
   const int words = static_cast<int>(g.frame_bytes() / 4);
-  Buffer* pixels = make(g.frame_bytes() / 4);
+  Buffer* pixels = buffers_.make(g.frame_bytes() / 4);
   steps_.push_back(make_step(flat_field_params{words}, {frame_, buffer, pixels}, words));
   stages_.push_back({"flat_field", 0, pixels, Stage::Length::whole});
   return pixels;
@@ -132,7 +126,7 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
 Buffer* MarkerPlan::add_halve(Buffer* pixels) {
   const MarkerGeometry& whole = searches_[0].geometry;
   const MarkerGeometry& half = searches_[1].geometry;
-  Buffer* half_pixels = make(half.frame_bytes() / 4);
+  Buffer* half_pixels = buffers_.make(half.frame_bytes() / 4);
   const halve_params params{whole.padded_width / 4, whole.padded_height, half.padded_width / 4, half.padded_height};
   steps_.push_back(make_step(params, {pixels, half_pixels}, params.half_row_words * params.half_rows));
   stages_.push_back({"halve", 1, half_pixels, Stage::Length::whole});
@@ -146,8 +140,9 @@ void MarkerPlan::add_stage(std::size_t index, const char* name, Buffer* buffer, 
 MarkerPlan::Tiles MarkerPlan::add_tiles(std::size_t index, Buffer* pixels, const normalize_params& normalize) {
   const MarkerGeometry& g = searches_[index].geometry;
   const int words = g.tile_rows * g.tile_row_words;
-  const Tiles tiles{make(static_cast<std::size_t>(words)), make(static_cast<std::size_t>(words)), make(4)};
-  Buffer* histograms = make(kHistogramGroups * 768);
+  const Tiles tiles{buffers_.make(static_cast<std::size_t>(words)), buffers_.make(static_cast<std::size_t>(words)),
+                    buffers_.make(4)};
+  Buffer* histograms = buffers_.make(kHistogramGroups * 768);
   add_step(make_step(tile_extrema_params{g.tile_row_words, g.tile_rows}, {pixels, tiles.minima, tiles.maxima}, words));
   add_stage(index, "tile_minima", tiles.minima);
   add_stage(index, "tile_maxima", tiles.maxima);
@@ -168,16 +163,16 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   const int base_at = g.word_groups * kGroupSize;
   const int height = g.height;
   const int row_words = g.bit_row_words;
-  Buffer* raw_bits = make(static_cast<std::size_t>(g.bit_words));
-  Buffer* bits = make(static_cast<std::size_t>(g.bit_words));
-  Buffer* offsets = make(static_cast<std::size_t>(base_at + g.word_groups + 1));
-  Buffer* cracks = make(static_cast<std::size_t>(g.max_run_ends));
-  Buffer* nodes = make(static_cast<std::size_t>(g.max_run_ends));
-  Buffer* spans = make(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
-  Buffer* points = make(static_cast<std::size_t>(g.max_points));
-  search.contours = make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
-  search.quads = make(contours * QUAD_WORDS);
-  search.edges = make(contours * EDGE_WORDS);
+  Buffer* raw_bits = buffers_.make(static_cast<std::size_t>(g.bit_words));
+  Buffer* bits = buffers_.make(static_cast<std::size_t>(g.bit_words));
+  Buffer* offsets = buffers_.make(static_cast<std::size_t>(base_at + g.word_groups + 1));
+  Buffer* cracks = buffers_.make(static_cast<std::size_t>(g.max_run_ends));
+  Buffer* nodes = buffers_.make(static_cast<std::size_t>(g.max_run_ends));
+  Buffer* spans = buffers_.make(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
+  Buffer* points = buffers_.make(static_cast<std::size_t>(g.max_points));
+  search.contours = buffers_.make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
+  search.quads = buffers_.make(contours * QUAD_WORDS);
+  search.edges = buffers_.make(contours * EDGE_WORDS);
 
   const auto run = [&](const auto& params, std::initializer_list<Buffer*> buffers, int items) {
     add_step(make_step(params, buffers, items));
@@ -225,12 +220,6 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   run(edge_refine_params{search.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},
       {pixels, tiles.levels, search.quads, search.edges}, g.max_contours * kGroupSize);
   stage("edge_refine", search.edges, Stage::Length::edges);
-}
-
-std::size_t MarkerPlan::device_bytes() const {
-  std::size_t bytes = 0;
-  for (const auto& buffer : buffers_) bytes += buffer->bytes();
-  return bytes;
 }
 
 void pad_frame(View2D<const u8> image, const MarkerGeometry& geometry, u8* frame) {

@@ -8,6 +8,7 @@
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
 #include "berth/image.hpp"
+#include "buffer_list.hpp"
 
 namespace berth {
 
@@ -72,10 +73,9 @@ class MarkerPlan {
 
   /// Outputs in order of computation.
   const std::vector<Stage>& stages() const { return stages_; }
-  std::size_t device_bytes() const;
+  std::size_t device_bytes() const { return buffers_.device_bytes(); }
 
  private:
-  Buffer* make(std::size_t words);
   Buffer* add_flat_field(const std::vector<float>& gains);
   Buffer* add_halve(Buffer* pixels);
   /// The tiles' extrema and the levels they give, for the search `index` and those after it on the same pixels.
@@ -93,7 +93,7 @@ class MarkerPlan {
 
   Backend& backend_;
   std::vector<MarkerSearch> searches_;
-  std::vector<std::unique_ptr<Buffer>> buffers_;
+  BufferList buffers_;
   Buffer* frame_ = nullptr;
   std::vector<Step> steps_;
   std::vector<Stage> stages_;

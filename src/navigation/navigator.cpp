@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "berth/error.hpp"
+#include "divide_up.hpp"
 #include "navigation/candidates.hpp"
 #include "navigation/network_output.hpp"
 #include "navigation/network_plan.hpp"
@@ -14,8 +15,6 @@ namespace {
 
 constexpr int kMinSide = 64;
 constexpr int kMaxSide = 16384;
-constexpr int kPadWidth = 32;
-constexpr int kPadHeight = 4;
 
 /// The search sees the frame this high, px: a target of 22 to 178 px in a 480 px frame has half of that.
 constexpr int kSearchHeight = 240;
@@ -28,8 +27,6 @@ constexpr int kWindowDiameter = 96;
 
 constexpr int kMinStep = 256;
 constexpr int kMaxStep = 2560;
-
-int round_up(int value, int multiple) { return (value + multiple - 1) / multiple * multiple; }
 
 int search_step(int height) { return std::clamp(height * 256 / kSearchHeight, kMinStep, kMaxStep); }
 
@@ -49,9 +46,8 @@ struct Navigator::Impl {
         config(config_),
         network(read_network(config_.network)),
         device(backend_, network),
-        padded_width(round_up(width_, kPadWidth)),
-        padded_height(round_up(height_, kPadHeight)),
-        padded(static_cast<std::size_t>(padded_width) * static_cast<std::size_t>(padded_height)),
+        padded_width(round_up(width_, 4)),
+        padded(static_cast<std::size_t>(padded_width) * static_cast<std::size_t>(height_)),
         frame(backend_.make_buffer(padded.size())),
         step(search_step(height_)),
         spacing(position_spacing(network)),
@@ -60,14 +56,16 @@ struct Navigator::Impl {
         close(device, view(), kCloseLooks, network.side, network.side),
         follow(device, view(), 1, network.side, network.side),
         stream(backend_.make_stream()),
+        whole{search_corner(width_, search.width()), search_corner(height_, search.height()), step, 0},
         search_sums(search.sums().bytes() / 4),
         close_sums(close.sums().bytes() / 4),
-        candidates(static_cast<std::size_t>(search.grid_width() * search.grid_height())) {}
+        candidates(static_cast<std::size_t>(search.grid_width() * search.grid_height())) {
+    upload_at_start(backend_, search.windows(), whole.data(), sizeof whole);
+  }
 
   FrameView view() const { return {frame.get(), width, height, padded_width}; }
 
-  bool run(NetworkPlan& plan, const s32* windows, std::size_t count, std::vector<s32>& sums) {
-    stream->upload(plan.windows(), windows, count * sizeof(s32));
+  bool run(NetworkPlan& plan, std::vector<s32>& sums) {
     stream->replay(plan.plan());
     stream->download(plan.sums(), sums.data(), plan.sums().bytes());
     return stream->finish();
@@ -97,16 +95,15 @@ struct Navigator::Impl {
   bool follow_last() {
     const std::array<s32, 4> window = window_at(sighting.x_q16, sighting.y_q16, sighting.d_q16);
     sighting.score_q15 = 0;
-    if (!run(follow, window.data(), window.size(), close_sums)) return false;
+    stream->upload(follow.windows(), window.data(), sizeof window);
+    if (!run(follow, close_sums)) return false;
     take(network_output(network, close_sums.data()), window);
     return true;
   }
 
   bool search_frame() {
     sighting.score_q15 = 0;
-    const std::array<s32, 4> whole = {search_corner(width, search_width()), search_corner(height, search_height()),
-                                      step, 0};
-    if (!run(search, whole.data(), whole.size(), search_sums)) return false;
+    if (!run(search, search_sums)) return false;
     const std::size_t found = find_candidates(network, search, whole.data(), spacing, search_sums.data(),
                                               config.search_threshold_q15, candidates);
     sighting.candidates = static_cast<int>(found);
@@ -117,7 +114,8 @@ struct Navigator::Impl {
       const std::array<s32, 4> window = window_at(place.x_q16, place.y_q16, place.d_q16);
       std::copy(window.begin(), window.end(), windows.begin() + static_cast<long>(k) * 4);
     }
-    if (!run(close, windows.data(), windows.size(), close_sums)) return false;
+    stream->upload(close.windows(), windows.data(), sizeof windows);
+    if (!run(close, close_sums)) return false;
     const std::size_t each = static_cast<std::size_t>(close.sums_each());
     for (std::size_t k = 0; k < std::min<std::size_t>(found, kCloseLooks); ++k) {
       const s32* w = windows.data() + k * 4;
@@ -126,8 +124,6 @@ struct Navigator::Impl {
     return true;
   }
 
-  int search_width() const { return search_length(width, step, network.side, spacing); }
-  int search_height() const { return search_length(height, step, network.side, spacing); }
   /// Of a window of `length` search px in the middle of the frame.
   s32 search_corner(int frame_length, int length) const { return (frame_length * 256 - length * step) / 2; }
 
@@ -153,7 +149,6 @@ struct Navigator::Impl {
   Network network;
   DeviceNetwork device;
   int padded_width;
-  int padded_height;
   std::vector<u8> padded;
   std::unique_ptr<Buffer> frame;
   int step;
@@ -162,6 +157,7 @@ struct Navigator::Impl {
   NetworkPlan close;
   NetworkPlan follow;
   std::unique_ptr<Stream> stream;
+  std::array<s32, 4> whole;  // the search's window
   std::vector<s32> search_sums;
   std::vector<s32> close_sums;
   std::vector<Candidate> candidates;

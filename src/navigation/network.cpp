@@ -118,10 +118,11 @@ class Check {
 
 }  // namespace
 
-s32 FixedScale::apply(s32 value) const {
+s32 FixedScale::apply(std::int64_t value) const {
   constexpr std::int64_t kMost = 1 << 30;
-  const std::int64_t scaled =
-      (static_cast<std::int64_t>(value) * multiplier + (std::int64_t{1} << (shift - 1))) >> shift;
+  const std::int64_t product = value * multiplier;
+  // (product + 2^(shift - 1)) >> shift, which could overflow.
+  const std::int64_t scaled = (product >> shift) + (product >> (shift - 1) & 1);
   return static_cast<s32>(std::clamp(scaled, -kMost, kMost));
 }
 

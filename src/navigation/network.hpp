@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <variant>
 #include <vector>
@@ -67,11 +68,11 @@ struct Heads {
   std::vector<s32> bias;
 };
 
-/// (v * multiplier + 2^(shift - 1)) >> shift, in 64 bits, held to ±2^30.
+/// (v * multiplier + 2^(shift - 1)) >> shift, held to ±2^30; |v| < 2^32.
 struct FixedScale {
   s32 multiplier = 0;
   int shift = 1;
-  s32 apply(s32 value) const;
+  s32 apply(std::int64_t value) const;
 };
 
 /// A navigation network of integers, checked: its layers fit together and no sum leaves 32 bits.

@@ -29,9 +29,7 @@ s32 diameter_q16(s32 e) {
 NetworkOutput network_output(const Network& network, const s32* sums) {
   NetworkOutput output;
   const std::int64_t difference = static_cast<std::int64_t>(sums[1]) - sums[0];
-  const std::int64_t scaled =
-      (difference * network.score.multiplier + (std::int64_t{1} << (network.score.shift - 1))) >> network.score.shift;
-  const std::int64_t z = std::clamp<std::int64_t>(scaled, -2048, 2047);
+  const s32 z = std::clamp(network.score.apply(difference), -2048, 2047);
   output.score_q15 = network.logistic[static_cast<std::size_t>(z + 2048)];
   if (network.heads.geometry == 0) return output;
   output.x_q16 = kMiddleQ16 + network.x.apply(sums[2]);

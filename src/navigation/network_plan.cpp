@@ -3,15 +3,13 @@
 #include <string>
 
 #include "berth/error.hpp"
+#include "divide_up.hpp"
 
 namespace berth {
 namespace {
 
 /// Most pixels that window_statistics may count.
 constexpr int kMaxCountedPixels = 66051;
-
-int divide_up(int value, int by) { return (value + by - 1) / by; }
-int round_up(int value, int multiple) { return divide_up(value, multiple) * multiple; }
 
 // Work-items of a launch; kernels/ops.h.
 int items_of(const convolve_params& p) {
@@ -72,17 +70,16 @@ std::vector<s32> channel_pairs(const std::vector<s32>& bias, const std::vector<s
 
 }  // namespace
 
-DeviceNetwork::DeviceNetwork(Backend& backend, const Network& network) : backend_(backend), network_(network) {
-  const std::unique_ptr<Stream> stream = backend.make_stream();
+DeviceNetwork::DeviceNetwork(Backend& backend, const Network& network)
+    : backend_(backend), network_(network), buffers_(backend) {
   const auto weighted = [&](const std::vector<u32>& weights, const std::vector<s32>& channels) {
-    constants_.push_back(
-        {add(*stream, weights.data(), weights.size() * 4), add(*stream, channels.data(), channels.size() * 4)});
+    constants_.push_back({add(weights.data(), weights.size() * 4), add(channels.data(), channels.size() * 4)});
   };
   for (const Layer& layer : network.layers) {
     if (const auto* convolve = std::get_if<ConvolveLayer>(&layer)) {
       weighted(packed_weights(*convolve), channel_pairs(convolve->bias, convolve->multipliers, convolve->out_channels));
     } else if (const auto* norm = std::get_if<LocalResponseNormLayer>(&layer)) {
-      constants_.push_back({add(*stream, norm->table.data(), sizeof norm->table)});
+      constants_.push_back({add(norm->table.data(), sizeof norm->table)});
     } else if (const auto* full = std::get_if<FullyConnectedLayer>(&layer)) {
       weighted(packed_rows(full->weights, full->out_channels, full->rows * full->columns, full->in_channels,
                            full->out_channels),
@@ -98,17 +95,10 @@ DeviceNetwork::DeviceNetwork(Backend& backend, const Network& network) : backend
            channel_pairs(heads.bias, {}, out_channels));
 }
 
-Buffer* DeviceNetwork::add(Stream& stream, const void* data, std::size_t bytes) {
-  buffers_.push_back(backend_.make_buffer(bytes));
-  stream.upload(*buffers_.back(), data, bytes);
-  if (!stream.finish()) throw Error(std::string(backend_.name()) + ": the device was lost while it got the network");
-  return buffers_.back().get();
-}
-
-std::size_t DeviceNetwork::device_bytes() const {
-  std::size_t bytes = 0;
-  for (const auto& buffer : buffers_) bytes += buffer->bytes();
-  return bytes;
+Buffer* DeviceNetwork::add(const void* data, std::size_t bytes) {
+  Buffer* buffer = buffers_.make(bytes / 4);
+  upload_at_start(backend_, *buffer, data, bytes);
+  return buffer;
 }
 
 namespace {
@@ -177,16 +167,16 @@ std::size_t tensor_words(const Shape& shape, int count) {
 }  // namespace
 
 NetworkPlan::NetworkPlan(const DeviceNetwork& device, const FrameView& frame, int windows, int width, int height)
-    : device_(device) {
+    : device_(device), width_(width), height_(height), buffers_(device.backend()) {
   const Network& network = device.network();
   if (width % 4 != 0 || width < network.side || height < network.side) {
     throw Error("a window of " + std::to_string(width) + "x" + std::to_string(height) +
                 " px; give at least the network's " + std::to_string(network.side) + ", its width a multiple of 4");
   }
   const std::vector<Shape> shapes = network.shapes(height, width);
-  Buffer* tensor = add_input(frame, windows, width, height);
+  Buffer* tensor = add_input(frame, windows);
   for (std::size_t i = 0; i < network.layers.size(); ++i) {
-    Buffer* output = make(tensor_words(shapes[i + 1], windows));
+    Buffer* output = buffers_.make(tensor_words(shapes[i + 1], windows));
     steps_.push_back(std::visit(LayerStep{windows, shapes[i], shapes[i + 1], tensor, device.constants()[i], output},
                                 network.layers[i]));
     tensor = output;
@@ -195,22 +185,22 @@ NetworkPlan::NetworkPlan(const DeviceNetwork& device, const FrameView& frame, in
   grid_height_ = last.height;
   grid_width_ = last.width;
   sums_each_ = round_up(network.heads.scores + network.heads.geometry, 4);
-  sums_ = make(static_cast<std::size_t>(windows * grid_height_ * grid_width_ * sums_each_));
+  sums_ = buffers_.make(static_cast<std::size_t>(windows * grid_height_ * grid_width_ * sums_each_));
   steps_.push_back(
       LayerStep{windows, last, last, tensor, device.constants().back(), sums_}.fully_connected(1, 1, sums_each_, -1));
   plan_ = device.backend().record(steps_);
 }
 
-Buffer* NetworkPlan::add_input(const FrameView& frame, int count, int width, int height) {
+Buffer* NetworkPlan::add_input(const FrameView& frame, int count) {
   const Network& network = device_.network();
-  const int words = width / 4 * height;
+  const int words = width_ / 4 * height_;
   const int all = count * words;
-  windows_ = make(static_cast<std::size_t>(count) * 4);
-  Buffer* pixels = make(static_cast<std::size_t>(all));
-  Buffer* statistics = make(static_cast<std::size_t>(count) * 2);
-  Buffer* input = make(static_cast<std::size_t>(all));
+  windows_ = buffers_.make(static_cast<std::size_t>(count) * 4);
+  Buffer* pixels = buffers_.make(static_cast<std::size_t>(all));
+  Buffer* statistics = buffers_.make(static_cast<std::size_t>(count) * 2);
+  Buffer* input = buffers_.make(static_cast<std::size_t>(all));
   steps_.push_back(
-      make_step(extract_window_params{frame.width, frame.height, frame.padded_width / 4, count, width / 4, height},
+      make_step(extract_window_params{frame.width, frame.height, frame.padded_width / 4, count, width_ / 4, height_},
                 {frame.pixels, windows_, pixels}, all));
   if (network.normalise) {
     const int stride = (words - 1) / (kMaxCountedPixels / 4) + 1;
@@ -219,23 +209,10 @@ Buffer* NetworkPlan::add_input(const FrameView& frame, int count, int width, int
   } else {
     std::vector<s32> fixed;
     for (int i = 0; i < count; ++i) fixed.insert(fixed.end(), {network.mean, 256});
-    const std::unique_ptr<Stream> stream = device_.backend().make_stream();
-    stream->upload(*statistics, fixed.data(), fixed.size() * 4);
-    if (!stream->finish()) throw Error(std::string(device_.backend().name()) + ": the device was lost at start");
+    upload_at_start(device_.backend(), *statistics, fixed.data(), fixed.size() * 4);
   }
   steps_.push_back(make_step(normalize_window_params{count, words}, {pixels, statistics, input}, all));
   return input;
-}
-
-Buffer* NetworkPlan::make(std::size_t words) {
-  buffers_.push_back(device_.backend().make_buffer(words * 4));
-  return buffers_.back().get();
-}
-
-std::size_t NetworkPlan::device_bytes() const {
-  std::size_t bytes = 0;
-  for (const auto& buffer : buffers_) bytes += buffer->bytes();
-  return bytes;
 }
 
 }  // namespace berth

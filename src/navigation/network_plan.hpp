@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "berth/backend.hpp"
+#include "buffer_list.hpp"
 #include "navigation/network.hpp"
 
 namespace berth {
@@ -18,14 +19,14 @@ class DeviceNetwork {
   /// The buffers an operation reads beside its input, for each layer and last the heads: weights and channels; the
   /// table; none.
   const std::vector<std::vector<Buffer*>>& constants() const { return constants_; }
-  std::size_t device_bytes() const;
+  std::size_t device_bytes() const { return buffers_.device_bytes(); }
 
  private:
-  Buffer* add(Stream& stream, const void* data, std::size_t bytes);
+  Buffer* add(const void* data, std::size_t bytes);
 
   Backend& backend_;
   const Network& network_;
-  std::vector<std::unique_ptr<Buffer>> buffers_;
+  BufferList buffers_;
   std::vector<std::vector<Buffer*>> constants_;
 };
 
@@ -51,16 +52,20 @@ class NetworkPlan {
   /// s32[windows, grid_height, grid_width, sums_each]: what network_output reads.
   Buffer& sums() { return *sums_; }
   int sums_each() const { return sums_each_; }
+  /// Of a window, px.
+  int width() const { return width_; }
+  int height() const { return height_; }
   int grid_height() const { return grid_height_; }
   int grid_width() const { return grid_width_; }
-  std::size_t device_bytes() const;
+  std::size_t device_bytes() const { return buffers_.device_bytes(); }
 
  private:
-  Buffer* make(std::size_t words);
-  Buffer* add_input(const FrameView& frame, int count, int width, int height);
+  Buffer* add_input(const FrameView& frame, int count);
 
   const DeviceNetwork& device_;
-  std::vector<std::unique_ptr<Buffer>> buffers_;
+  int width_;
+  int height_;
+  BufferList buffers_;
   std::vector<Step> steps_;
   std::unique_ptr<Plan> plan_;
   Buffer* windows_ = nullptr;

@@ -24,8 +24,7 @@ WindowScorer::WindowScorer(Backend& backend, const Network& network, int batch)
       sums_(plan_.sums().bytes() / 4) {
   std::vector<s32> windows;  // the images below each other
   for (int k = 0; k < batch; ++k) windows.insert(windows.end(), {0, k * network.side * 256, 256, 0});
-  stream_->upload(plan_.windows(), windows.data(), windows.size() * 4);
-  if (!stream_->finish()) throw Error(std::string(backend.name()) + ": the device was lost at start");
+  upload_at_start(backend, plan_.windows(), windows.data(), windows.size() * 4);
 }
 
 std::vector<WindowScore> WindowScorer::score(const u8* images, int count) {
