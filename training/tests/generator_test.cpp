@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "berth/error.hpp"
-#include "hash.hpp"
-#include "set.hpp"
-#include "target.hpp"
+#include "navset/hash.hpp"
+#include "navset/set.hpp"
+#include "navset/target.hpp"
 
 namespace berth::navset {
 namespace {

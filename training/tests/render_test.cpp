@@ -1,4 +1,4 @@
-#include "render.hpp"
+#include "navset/render.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 #include <fstream>
 
 #include "berth/error.hpp"
-#include "mesh.hpp"
-#include "target.hpp"
+#include "navset/mesh.hpp"
+#include "navset/target.hpp"
 
 namespace berth::navset {
 namespace {

@@ -1,4 +1,4 @@
-#include "render.hpp"
+#include "navset/render.hpp"
 
 #include <algorithm>
 #include <cmath>

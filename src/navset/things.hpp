@@ -1,7 +1,7 @@
 #pragma once
 
-#include "parts.hpp"
-#include "target.hpp"
+#include "navset/parts.hpp"
+#include "navset/target.hpp"
 
 namespace berth::navset {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "shape.hpp"
+#include "navset/shape.hpp"
 
 namespace berth::navset {
 

@@ -1,4 +1,4 @@
-#include "things.hpp"
+#include "navset/things.hpp"
 
 namespace berth::navset {
 namespace {

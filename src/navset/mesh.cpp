@@ -1,4 +1,4 @@
-#include "mesh.hpp"
+#include "navset/mesh.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "berth/image.hpp"
-#include "render.hpp"
+#include "navset/render.hpp"
 
 namespace berth::navset {
 

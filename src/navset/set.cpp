@@ -1,4 +1,4 @@
-#include "set.hpp"
+#include "navset/set.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "berth/error.hpp"
-#include "hash.hpp"
-#include "target.hpp"
+#include "navset/hash.hpp"
+#include "navset/target.hpp"
 
 namespace berth::navset {
 namespace {

@@ -2,12 +2,18 @@
 
 #include <string>
 
-#include "parts.hpp"
+#include "navset/parts.hpp"
 
 namespace berth::navset {
 
 /// Diameter of the sphere about the target's origin that its farthest points, the wings' tips, lie on. d = f·D/Z.
 constexpr double kTargetDiameter_m = 0.4;
+
+/// Beside its ring (-z) the target has marker 1 of tag36h11, of this side, upright where x is right and y down.
+constexpr int kDockMarker = 1;
+constexpr double kDockMarkerSide_m = 0.068 * 8 / 12;  // 8 of the plate's 12 modules
+/// From the marker's frame to the target's.
+Pose dock_marker_pose();
 
 /// How the one target may be painted and wrapped.
 struct Livery {

@@ -1,4 +1,4 @@
-#include "target.hpp"
+#include "navset/target.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +9,7 @@ namespace berth::navset {
 namespace {
 
 constexpr double kBody = 0.062, kBodyLength = 0.07;  // half sides
+constexpr double kPlate = 0.034, kPlate_z = -kBodyLength - 0.006;
 constexpr double kWingWidth = 0.055, kWingThickness = 0.002;
 
 class Builder {
@@ -52,7 +53,7 @@ class Builder {
     return model;
   }
 
-  Model plate() { return {tag_plate(1, 0.034, {0, 0, -kBodyLength - 0.006}, kAgainstZ)}; }
+  Model plate() { return {tag_plate(kDockMarker, kPlate, {0, 0, kPlate_z}, kAgainstZ)}; }
 
   Model engine() {
     const double z = kBodyLength + 0.004;
@@ -101,6 +102,8 @@ class Builder {
 void join(Model& model, const Model& more) { model.insert(model.end(), more.begin(), more.end()); }
 
 }  // namespace
+
+Pose dock_marker_pose() { return sim::translation(0, 0, kPlate_z); }
 
 const std::vector<Livery>& liveries() {
   static const std::vector<Livery> all = {

@@ -1,10 +1,10 @@
-#include "develop.hpp"
+#include "navset/develop.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "parts.hpp"
-#include "sample.hpp"
+#include "navset/parts.hpp"
+#include "navset/sample.hpp"
 
 namespace berth::navset {
 namespace {
@@ -54,7 +54,8 @@ class ToneCurve {
   std::vector<double> nodes_;
 };
 
-// Half the brightness that a tenth of the pixels reach, half that which one in a hundred does.
+}  // namespace
+
 double metered(const std::vector<double>& radiance) {
   constexpr int kBins = 1024;
   std::vector<long> counts(kBins + 1, 0);
@@ -70,8 +71,6 @@ double metered(const std::vector<double>& radiance) {
   }
   return sum;
 }
-
-}  // namespace
 
 Exposure random_exposure(const std::vector<double>& radiance, sim::Random& random) {
   Exposure e;

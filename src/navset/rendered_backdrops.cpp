@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backdrop.hpp"
+#include "navset/backdrop.hpp"
+#include "navset/things.hpp"
 #include "sim/sensor.hpp"
-#include "things.hpp"
 
 namespace berth::navset {
 namespace {

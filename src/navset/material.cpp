@@ -1,4 +1,4 @@
-#include "material.hpp"
+#include "navset/material.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -160,7 +160,8 @@ SurfaceLook look_at(const Material& m, double u, double v) {
         const auto i = static_cast<int>((x / m.scale + 1) * 0.5 * side);
         return std::min(side - 1, std::max(0, i));
       };
-      return {m.pattern->cells[static_cast<std::size_t>(cell(v) * side + cell(u))], 0, 0};
+      // Rows go down where v goes up.
+      return {m.pattern->cells[static_cast<std::size_t>(cell(-v) * side + cell(u))], 0, 0};
     }
   }
   return {m.albedo, 0, 0};

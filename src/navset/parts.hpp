@@ -1,6 +1,6 @@
 #pragma once
 
-#include "scene.hpp"
+#include "navset/scene.hpp"
 
 namespace berth::navset {
 

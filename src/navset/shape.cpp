@@ -1,9 +1,9 @@
-#include "shape.hpp"
+#include "navset/shape.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "mesh.hpp"
+#include "navset/mesh.hpp"
 
 namespace berth::navset {
 namespace {

@@ -3,9 +3,9 @@
 #include <memory>
 #include <vector>
 
-#include "backdrop.hpp"
-#include "mesh.hpp"
-#include "render.hpp"
+#include "navset/backdrop.hpp"
+#include "navset/mesh.hpp"
+#include "navset/render.hpp"
 #include "sim/sensor.hpp"
 
 namespace berth::navset {

@@ -19,6 +19,9 @@ struct Exposure {
   double full_well_e = 10000;             ///< electrons at white: shot noise
   double read_noise = 1;                  ///< grey levels
 };
+/// What automatic exposure goes by: half the brightness that a tenth of the pixels reach and half that which one in a
+/// hundred does, together.
+double metered(const std::vector<double>& radiance);
 /// A camera's automatic exposure, now and then a poor one: metered on the brighter parts of the radiance.
 Exposure random_exposure(const std::vector<double>& radiance, sim::Random& random);
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "scene.hpp"
+#include "navset/scene.hpp"
 
 namespace berth::navset {
 

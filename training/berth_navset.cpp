@@ -13,9 +13,9 @@
 #include <thread>
 
 #include "berth/error.hpp"
-#include "hash.hpp"
-#include "set.hpp"
-#include "target.hpp"
+#include "navset/hash.hpp"
+#include "navset/set.hpp"
+#include "navset/target.hpp"
 
 namespace {
 
@@ -23,7 +23,7 @@ using namespace berth;
 using namespace berth::navset;
 
 /// Rises with every change that moves a bit of a set.
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 std::vector<std::string> mesh_files(const std::string& folder) {
   std::vector<std::string> files;

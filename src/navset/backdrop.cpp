@@ -1,10 +1,10 @@
-#include "backdrop.hpp"
+#include "navset/backdrop.hpp"
 
 #include <fstream>
 #include <sstream>
 
 #include "berth/error.hpp"
-#include "hash.hpp"
+#include "navset/hash.hpp"
 
 namespace berth::navset {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "sample.hpp"
+#include "navset/sample.hpp"
 
 namespace berth::navset {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "berth/marker.hpp"
-#include "material.hpp"
+#include "navset/material.hpp"
 
 namespace berth::navset {
 

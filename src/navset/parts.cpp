@@ -1,4 +1,4 @@
-#include "parts.hpp"
+#include "navset/parts.hpp"
 
 namespace berth::navset {
 

@@ -1,4 +1,4 @@
-#include "scene.hpp"
+#include "navset/scene.hpp"
 
 #include <algorithm>
 

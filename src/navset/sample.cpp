@@ -1,10 +1,11 @@
-#include "sample.hpp"
+#include "navset/sample.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "develop.hpp"
-#include "things.hpp"
+#include "navset/develop.hpp"
+#include "navset/lighting.hpp"
+#include "navset/things.hpp"
 
 namespace berth::navset {
 namespace {
@@ -83,31 +84,7 @@ class Studio::Shot {
     depth_m_ = camera_.focal_px * kTargetDiameter_m / d_px_;
   }
 
-  void choose_light() {
-    light_.key = random_direction(random_);
-    // Mostly from the camera's side.
-    if (light_.key[2] > 0 && random_.chance(0.6)) light_.key[2] = -light_.key[2];
-    light_.fill = random_direction(random_);
-    light_.up = sim::normalized({random_.uniform(-0.5, 0.5), -1, random_.uniform(-0.5, 0.5)});
-    const int mode =
-        space_ ? (random_.chance(0.85) ? random_.integer(0, 1) : 2) : (random_.chance(0.7) ? 2 : random_.integer(0, 1));
-    if (mode == 0) {
-      label_.light = "sun";
-      light_.key_strength = random_.uniform(0.9, 1.9);
-      light_.ambient = random_.uniform(0.0, 0.05);
-      light_.fill_strength = random_.chance(0.6) ? random_.uniform(0.02, 0.2) : 0.0;
-    } else if (mode == 1) {
-      label_.light = "earthshine";
-      light_.key_strength = random_.chance(0.4) ? random_.uniform(0.1, 0.8) : 0.0;
-      light_.ambient = random_.uniform(0.02, 0.2);
-      light_.fill_strength = random_.uniform(0.3, 0.9);
-    } else {
-      label_.light = "lamps";
-      light_.key_strength = random_.uniform(0.2, 1.0);
-      light_.ambient = random_.uniform(0.12, 0.5);
-      light_.fill_strength = random_.uniform(0.0, 0.5);
-    }
-  }
+  void choose_light() { light_ = random_light(space_, random_, label_.light); }
 
   Vec3 at(double x, double y, double depth) const {
     return {(x - camera_.cx) / camera_.focal_px * depth, (y - camera_.cy) / camera_.focal_px * depth, depth};

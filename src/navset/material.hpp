@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "shape.hpp"
+#include "navset/shape.hpp"
 #include "sim/random.hpp"
 
 namespace berth::navset {
