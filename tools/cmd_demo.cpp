@@ -5,6 +5,7 @@
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
+#include "shared_file.hpp"
 #include "stream.hpp"
 
 namespace berth::cli {
@@ -18,21 +19,6 @@ constexpr const char* kExamples = R"(Examples:
   berth demo --scenario scenarios/rectangle.toml --max-frames 100
 
 Writes into --out: log.jsonl (a JSON line a frame, with the truth), trajectory.svg, markers.png.)";
-
-/// The built-in scenario: installed beside the command, or in the source tree it was built from.
-std::string built_in_scenario() {
-  const fs::path in_share = fs::path("share") / "berth" / "scenarios" / "approach.toml";
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path candidates[] = {program.parent_path().parent_path() / in_share,
-                                 fs::path(BERTH_SOURCE_DIR) / "scenarios" / "approach.toml",
-                                 fs::path("scenarios") / "approach.toml"};
-  for (const fs::path& candidate : candidates) {
-    if (fs::exists(candidate, error)) return candidate.string();
-  }
-  throw Error(candidates[0].string() +
-              ": the demo's scenario is not there; install Berth whole, or name one by --scenario");
-}
 
 }  // namespace
 
@@ -54,7 +40,9 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
   add_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
-    const std::string scenario = options->scenario.empty() ? built_in_scenario() : options->scenario;
+    const std::string scenario = options->scenario.empty()
+                                     ? shared_file("scenarios/approach.toml", "name a scenario by --scenario")
+                                     : options->scenario;
     const std::unique_ptr<Source> source = open_source("sim:" + scenario);
     std::error_code error;
     fs::create_directories(options->out, error);

@@ -13,6 +13,7 @@ constexpr const char* kExamples = R"(Examples:
   berth demo                                     a simulated approach, start to docked
   berth detect photo.jpg                         the markers in a photo, as a table
   berth detect --json --family tag36h11 photos/  the same for a folder, as JSON lines
+  berth flight                                   from 6 m to the docked marker, with the network
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
@@ -34,6 +35,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   int exit_code = kOk;
   add_demo(app, console, exit_code);
   add_detect(app, console, exit_code);
+  add_flight(app, console, exit_code);
   add_run(app, console, exit_code);
   add_verify(app, console, exit_code);
   add_bench(app, console, exit_code);

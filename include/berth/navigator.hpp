@@ -64,6 +64,8 @@ class Navigator {
   const Sighting& look(View2D<const u8> image, const FrameStamp& stamp = {});
   /// Makes the next frame search.
   void forget();
+  /// Makes the next frame look here first: a target's centre and diameter, px of the frame.
+  void expect(double x_px, double y_px, double d_px);
 
   /// Bytes of device memory, all taken at start.
   std::size_t device_bytes() const;

@@ -208,6 +208,18 @@ const Sighting& Navigator::look(View2D<const u8> image, const FrameStamp& stamp)
 
 void Navigator::forget() { impl_->sighting.status = FrameStatus::no_target; }
 
+void Navigator::expect(double x_px, double y_px, double d_px) {
+  Sighting& sighting = impl_->sighting;
+  // What lies far outside is no place to look at, and must not overflow.
+  const auto q16 = [](double px) {
+    return static_cast<std::int64_t>(std::clamp(px, -2.0 * kMaxSide, 2.0 * kMaxSide) * 65536);
+  };
+  sighting.x_q16 = q16(x_px);
+  sighting.y_q16 = q16(y_px);
+  sighting.d_q16 = q16(std::max(1.0, d_px));
+  sighting.status = FrameStatus::ok;
+}
+
 std::size_t Navigator::device_bytes() const {
   const Impl& it = *impl_;
   return it.device.device_bytes() + it.search.device_bytes() + it.close.device_bytes() + it.follow.device_bytes() +

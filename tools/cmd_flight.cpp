@@ -1,0 +1,213 @@
+// berth flight: from the first sight of the target to its marker, in simulation; one flight in pictures, or many.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "berth/error.hpp"
+#include "commands.hpp"
+#include "engine.hpp"
+#include "film_strip.hpp"
+#include "flight_run.hpp"
+#include "flight_svg.hpp"
+#include "shared_file.hpp"
+
+namespace berth::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExamples = R"(Examples:
+  berth flight                                     one flight: flight.svg, flight.png, flight.jsonl
+  berth flight --seed 7 --backend vulkan
+  berth flight --count 1000 --jobs 2 --out flights     a campaign; the same command again goes on with it
+
+A flight goes from 6 m to 0.15 m before the marker. All of it is a function of its seed.)";
+
+struct FlightCommand {
+  std::string network;
+  std::string out = "berth-flight";
+  EngineOptions engine;
+  std::uint64_t seed = 1;
+  int frames = 240;
+  int count = 1;
+  int jobs = 1;
+};
+
+/// The pilot and its backend.
+struct Crew {
+  explicit Crew(const FlightCommand& command) : backend(std::move(open_chosen_backends(command.engine).backends[0])) {
+    const CameraModel camera = navset::Flight::camera();
+    pilot = std::make_unique<Pilot>(*backend, *backend, camera.width, camera.height, flight_pilot(command.network));
+  }
+  std::unique_ptr<Backend> backend;
+  std::unique_ptr<Pilot> pilot;
+};
+
+void write_file(const fs::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw Error(path.string() + ": cannot be written; check the folder, its permissions and space");
+}
+
+int fly_one(const FlightCommand& command, Console& console) {
+  Crew crew(command);
+  const navset::Flight flight(command.seed, command.frames);
+  console.out() << fmt::format("flight {}: {}; {} on {}\n", command.seed, flight.title(), crew.backend->name(),
+                               crew.backend->device().name);
+  FilmStrip strip(navset::Flight::camera(), navset::kTargetDiameter_m);
+  int index = 0;
+  const auto watch = [&](const navset::FlightFrame& truth, const PilotFrame& found) {
+    const int last = command.frames - 1;
+    const bool pictured = index * 8 / std::max(1, last) != (index - 1) * 8 / std::max(1, last) || index == 0;
+    const double range = std::sqrt(sim::dot(truth.target.t, truth.target.t));
+    if (pictured) strip.add(truth.image.view(), found, fmt::format("{:.2f} m  {}", range, name_of(found.mode)));
+    if (found.change[0] != '\0') {
+      console.out() << fmt::format("  frame {:>3}  {:.2f} m  {}: {}\n", index, range, name_of(found.mode),
+                                   found.change);
+    }
+    if (console.out_is_terminal()) {
+      console.out() << fmt::format("\r  {:3.0f} %  {}\x1b[K\r", 100.0 * index / std::max(1, last), name_of(found.mode))
+                    << std::flush;
+    }
+    ++index;
+  };
+  const FlightLog log = fly(flight, command.seed, *crew.pilot, watch);
+  const fs::path out(command.out);
+  write_file(out / "flight.svg", flight_svg(log));
+  write_file(out / "flight.jsonl", to_json_line(log) + "\n");
+  strip.write((out / "flight.png").string(), 3);
+  console.out() << fmt::format("{}; longest gap {} frames, {} frames with something else for the target\n",
+                               log.docked() ? "docked" : "NOT docked", log.longest_gap(), log.wrong())
+                << fmt::format("drawing     {}\nframes      {}\nlog         {}\n", (out / "flight.svg").string(),
+                               (out / "flight.png").string(), (out / "flight.jsonl").string());
+  return log.docked() ? kOk : kNoResult;
+}
+
+/// The lines of earlier flights; one cut off in the middle does not count.
+std::vector<nlohmann::json> read_lines(const fs::path& path) {
+  std::vector<nlohmann::json> lines;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    nlohmann::json parsed = nlohmann::json::parse(line, nullptr, false);
+    if (!parsed.is_discarded()) lines.push_back(std::move(parsed));
+  }
+  return lines;
+}
+
+void sum_up(const std::vector<nlohmann::json>& flights, Console& console) {
+  int docked = 0;
+  int gaps = 0;
+  int wrong = 0;
+  int longest = 0;
+  std::size_t changes = 0;
+  for (const nlohmann::json& flight : flights) {
+    docked += flight.at("docked").get<bool>() ? 1 : 0;
+    gaps += flight.at("longest_gap").get<int>() > 3 ? 1 : 0;
+    wrong += flight.at("wrong").get<int>() > 0 ? 1 : 0;
+    longest = std::max(longest, flight.at("longest_gap").get<int>());
+    changes += flight.at("changes").size();
+  }
+  console.out() << fmt::format(
+      "\n| flights | docked | gap over 3 frames | longest gap | something else for the target | changes of mode each "
+      "|\n"
+      "|---|---|---|---|---|---|\n| {} | {} | {} | {} | {} | {:.2f} |\n",
+      flights.size(), docked, gaps, longest, wrong,
+      static_cast<double>(changes) / static_cast<double>(std::max<std::size_t>(1, flights.size())));
+}
+
+int fly_many(const FlightCommand& command, Console& console) {
+  const fs::path path = fs::path(command.out) / "flights.jsonl";
+  std::vector<nlohmann::json> flights = read_lines(path);
+  std::set<std::uint64_t> flown;
+  for (const nlohmann::json& flight : flights) flown.insert(flight.at("seed").get<std::uint64_t>());
+  // Whole lines only, before more are added.
+  std::string text;
+  for (const nlohmann::json& flight : flights) text += flight.dump() + "\n";
+  write_file(path, text);
+  std::ofstream file(path, std::ios::binary | std::ios::app);
+  std::vector<std::uint64_t> seeds;
+  for (int k = 0; k < command.count; ++k) {
+    const std::uint64_t seed = command.seed + static_cast<std::uint64_t>(k);
+    if (flown.count(seed) == 0) seeds.push_back(seed);
+  }
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::string failure;
+  const auto work = [&] {
+    try {
+      while (true) {
+        const std::size_t k = next++;
+        if (k >= seeds.size()) return;
+        // A new pilot each: nothing of one flight may reach the next.
+        const Crew crew(command);
+        const std::string line = to_json_line(fly(navset::Flight(seeds[k], command.frames), seeds[k], *crew.pilot));
+        const std::lock_guard<std::mutex> lock(mutex);
+        file << line << '\n' << std::flush;
+        flights.push_back(nlohmann::json::parse(line));
+        if (console.out_is_terminal() || flights.size() % 20 == 0) {
+          console.out() << fmt::format("{}{} of {} flights{}", console.out_is_terminal() ? "\r" : "", flights.size(),
+                                       flown.size() + seeds.size(), console.out_is_terminal() ? "\x1b[K" : "\n")
+                        << std::flush;
+        }
+      }
+    } catch (const std::exception& error) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      failure = error.what();
+      next = seeds.size();
+    }
+  };
+  std::vector<std::thread> crews;
+  for (int k = 0; k < command.jobs; ++k) crews.emplace_back(work);
+  for (std::thread& crew : crews) crew.join();
+  if (!failure.empty()) throw Error(failure);
+  if (!file) throw Error(path.string() + ": writing failed; check the disk's space");
+  sum_up(flights, console);
+  console.out() << "log         " << path.string() << '\n';
+  const bool all = std::all_of(flights.begin(), flights.end(),
+                               [](const nlohmann::json& flight) { return flight.at("docked").get<bool>(); });
+  return all ? kOk : kNoResult;
+}
+
+}  // namespace
+
+void add_flight(CLI::App& app, Console& console, int& exit_code) {
+  CLI::App* command = app.add_subcommand("flight", "Watch simulated flights from 6 m to the docked marker");
+  const auto options = std::make_shared<FlightCommand>();
+  command->add_option("--network", options->network, "the network's file [the one that comes with Berth]")
+      ->type_name("FILE");
+  command->add_option("--seed", options->seed, "the flight, or the first of many")
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--frames", options->frames, "frames of a flight")
+      ->check(CLI::Range(20, 100000))
+      ->capture_default_str();
+  command->add_option("--count", options->count, "flights; more than one write a line each and no pictures")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command->add_option("--jobs", options->jobs, "flights at a time")->check(CLI::Range(1, 256))->capture_default_str();
+  command->add_option("--out", options->out, "folder for logs and pictures")->type_name("DIR")->capture_default_str();
+  add_backend_options(*command, options->engine);
+  command->footer(kExamples);
+  command->callback([options, &console, &exit_code] {
+    if (options->network.empty()) options->network = shared_file("models/lite.berthnet", "name a network by --network");
+    std::error_code error;
+    fs::create_directories(options->out, error);
+    if (error) {
+      throw Error(options->out + ": the folder cannot be made (" + error.message() + "); name another by --out");
+    }
+    exit_code = options->count == 1 ? fly_one(*options, console) : fly_many(*options, console);
+  });
+}
+
+}  // namespace berth::cli
