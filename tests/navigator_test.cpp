@@ -120,5 +120,22 @@ TEST(Navigator, RefusesWhatItCannotDo) {
               ThrowsMessage<Error>(HasSubstr("an image of 320x240 for a navigator of 640x480")));
 }
 
+TEST(Navigator, LooksFirstWhereItIsToldTo) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  NavigatorConfig config = tiny_config();
+  config.threshold_q15 = 1;  // whatever it looks at is a target
+  Navigator navigator(*backend, 640, 480, config);
+  navigator.expect(400, 100, 96);
+  const GrayImage image = noise(640, 480, 3);
+  const Sighting& sighting = navigator.look(image.view());
+  EXPECT_TRUE(sighting.tracked);
+  // 256 window pixels at full size, their middle at the place: 400 + 1/2 - 128.
+  EXPECT_EQ(sighting.window, (std::array<s32, 3>{272 * 256, -28 * 256, 256}));
+  navigator.expect(1e300, -1e300, 1e300);
+  EXPECT_NO_THROW(navigator.look(image.view()));
+  navigator.forget();
+  EXPECT_FALSE(navigator.look(image.view()).tracked);
+}
+
 }  // namespace
 }  // namespace berth

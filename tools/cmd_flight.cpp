@@ -190,7 +190,7 @@ void add_flight(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("N")
       ->capture_default_str();
   command->add_option("--frames", options->frames, "frames of a flight")
-      ->check(CLI::Range(20, 100000))
+      ->check(CLI::Range(5, 100000))
       ->capture_default_str();
   command->add_option("--count", options->count, "flights; more than one write a line each and no pictures")
       ->check(CLI::Range(1, 1000000))

@@ -104,6 +104,11 @@ class Trainer:
         return {"iteration": self.iteration, "network": self.network.state_dict(), "mean": self.mean,
                 "optimizer": self.optimizer.state_dict(), "settings": self.settings}
 
+    def start_from(self, state):
+        """Takes over the convolutions of a pretrain.py run; the fully connected layers stay as they are."""
+        kept = {k: v for k, v in state["network"].items() if k.startswith(("convs.", "norms."))}
+        self.network.load_state_dict(kept, strict=False)
+
     def restore(self, state):
         self.network.load_state_dict(state["network"])
         self.optimizer.load_state_dict(state["optimizer"])
@@ -116,14 +121,14 @@ def save(state, path):
     os.replace(f"{path}.part", path)
 
 
-def open_log(path, iteration):
+def open_log(path, iteration, columns=LOG):
     """log.csv without rows later than `iteration`, ready to append to."""
     rows = []
     if path.exists():
         with open(path, newline="") as file:
             rows = [row for row in csv.DictReader(file) if int(row["iteration"]) <= iteration]
     file = open(path, "w", newline="")
-    log = csv.DictWriter(file, LOG)
+    log = csv.DictWriter(file, columns)
     log.writeheader()
     log.writerows(rows)
     file.flush()
@@ -164,6 +169,7 @@ def main():
     parser.add_argument("--test", metavar="SET", help="the set whose test part to use (default: the first --train)")
     parser.add_argument("--iterations", type=int, default=30000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", metavar="RUN", help="a run of pretrain.py whose convolutions to begin with")
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--weight-decay", type=float, default=0.02)
     parser.add_argument("--dropout", type=float, default=0.0, help="in the fully connected layers")
@@ -186,6 +192,7 @@ def main():
         settings = {name: getattr(arguments, name) for name in names}
         settings["train"] = [os.path.abspath(path) for path in arguments.train]
         settings["test"] = os.path.abspath(arguments.test or arguments.train[0])
+        settings["start"] = arguments.start and os.path.abspath(arguments.start)
         settings["manifests"] = [NavSet(path).manifest for path in [*settings["train"], settings["test"]]]
         folder.mkdir(parents=True, exist_ok=True)
         settings_file.write_text(json.dumps(settings, indent=2) + "\n")
@@ -199,6 +206,9 @@ def main():
     trainer = Trainer(settings, train, test, device)
     if (folder / "latest.pt").exists():
         trainer.restore(torch.load(folder / "latest.pt", map_location=device, weights_only=True))
+    elif settings.get("start"):
+        start = pathlib.Path(settings["start"]) / "latest.pt"
+        trainer.start_from(torch.load(start, map_location=device, weights_only=True))
     parameters, macs = size_of(trainer.network)
     print(f"{settings['network']}: {parameters / 1e6:.2f} M parameters, {macs / 1e6:.0f} MMAC; {len(train)} training and "
           f"{len(test)} test images; {device}, {arguments.threads} threads; from iteration {trainer.iteration}", flush=True)
