@@ -14,6 +14,7 @@ import curves  # noqa: E402
 from batches import BATCH, Samples, augmented, normalised, shifted, training_batch  # noqa: E402
 from model import LocalResponseNorm, Network, size_of  # noqa: E402
 from navset import NavSet  # noqa: E402
+from pretrain import CropNetwork, Pretrainer, crops, place_loss  # noqa: E402
 from train import LOG, Trainer, run  # noqa: E402
 
 
@@ -106,6 +107,64 @@ class Batches(unittest.TestCase):
         image = np.arange(256, dtype=np.uint8)[None, :].repeat(256, 0)
         self.assertEqual(shifted(image, 3, 0)[0, :5].tolist(), [0, 0, 0, 0, 1])
         self.assertEqual(shifted(image, -3, 0)[0, -4:].tolist(), [255, 255, 255, 255])
+
+
+class Crops(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.samples = Samples([small_set(pathlib.Path(self.temporary.name))], "train")
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def test_the_centre_moves_with_the_picture(self):
+        images, (x, y, d) = crops(np.random.default_rng(4), self.samples, np.arange(40))
+        for image, present, column, row, size in zip(images, self.samples.present, x, y, d):
+            if not present:
+                self.assertEqual((column, row, size), (0, 0, 0))
+                continue
+            bright = np.argwhere(image == 220)  # the square about the target's centre
+            if bright.min() > 0 and bright.max() < 127:  # not cut off
+                np.testing.assert_allclose(bright.mean(0), (row - 0.5, column - 0.5), atol=1.1)
+                self.assertAlmostEqual(np.ptp(bright[:, 0]) + 1, size, delta=1.1)
+        self.assertGreater(len(np.unique(x)), 10)
+
+    def test_places_are_those_of_the_maps_cells(self):
+        network = CropNetwork("lite").eval()
+        self.assertEqual(network.centres().tolist(), [15.5 + 16 * k for k in range(7)])
+        # The cell that a bright dot reaches at all lies about it.
+        dark = torch.zeros(1, 1, 128, 128)
+        dot = dark.clone()
+        dot[0, 0, 63, 63] = 50
+        with torch.no_grad():
+            reached = (network(dot)[1] - network(dark)[1])[0].abs() > 0
+        rows = torch.nonzero(reached).float().mean(0)
+        self.assertTrue(torch.all((rows - 3).abs() < 0.6), rows)
+
+    def test_a_place_counts_where_the_target_is(self):
+        centres = 15.5 + 16 * torch.arange(7)
+        present, x, y, d = torch.ones(1), torch.tensor([63.5]), torch.tensor([31.5]), torch.tensor([40.0])
+        right, wrong = torch.full((1, 7, 7), -9.0), torch.full((1, 7, 7), -9.0)
+        right[0, 1, 3] = wrong[0, 5, 5] = 9
+        self.assertLess(place_loss(right, centres, present, x, y, d), 0.1)
+        self.assertGreater(place_loss(wrong, centres, present, x, y, d), 15)
+        self.assertGreater(place_loss(right, centres, torch.zeros(1), x, y, d), 8)
+
+    def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(self):
+        torch.set_num_threads(1)
+        settings = {"network": "lite", "seed": 2, "learning_rate": 1e-3, "iterations": 6}
+        whole, first, second = (Pretrainer(settings, self.samples, "cpu") for _ in range(3))
+        for _ in range(3):
+            whole.step()
+        first.step()
+        second.restore(first.state())
+        for _ in range(2):
+            second.step()
+        for (name, a), b in zip(whole.network.state_dict().items(), second.network.state_dict().values()):
+            self.assertTrue(torch.equal(a, b), name)
+        trainer = Trainer(SETTINGS, self.samples, self.samples, "cpu")
+        trainer.start_from(whole.state())
+        self.assertTrue(torch.equal(trainer.network.convs[4].weight, whole.network.network.convs[4].weight))
 
 
 class Runs(unittest.TestCase):
