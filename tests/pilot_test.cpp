@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <iomanip>
+#include <sstream>
+
 #include "berth/error.hpp"
 #include "navset/flight.hpp"
 #include "pilot/mode_switch.hpp"
@@ -213,6 +216,21 @@ TEST(CliFlight, GoesOnWithACampaign) {
   folder.write("many/flights.jsonl", whole.substr(0, whole.size() - 10));
   EXPECT_THAT(fly("3").out, HasSubstr("| 3 |"));
   EXPECT_EQ(test::CommandRun::json_lines(test::text_of(folder / "many/flights.jsonl")).size(), 3u);
+}
+
+TEST(CliFlight, CountsFalseAlarmsWithoutATarget) {
+  const test::ScratchFolder folder;
+  const test::CommandRun run = test::run_berth(
+      {"flight", "--network", kTiny, "--empty", "--frames", "6", "--out", folder / "empty", "--backend", "simd"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const auto log = test::CommandRun::json_lines(test::text_of(folder / "empty/empty.jsonl"));
+  ASSERT_EQ(log.size(), 1u);
+  EXPECT_FALSE(log[0]["docked"].get<bool>());
+  EXPECT_EQ(log[0]["marker"]["frames"].get<int>(), 0);
+  // The tiny network sees a target in every noise: whatever it saw is counted.
+  std::ostringstream row;
+  row << "| 1 | 6 | " << std::fixed << std::setprecision(2) << log[0]["sightings"].get<int>() * 1000 / 6.0 << " |";
+  EXPECT_THAT(run.out, HasSubstr(row.str()));
 }
 
 }  // namespace

@@ -41,6 +41,7 @@ struct FlightCommand {
   int frames = 240;
   int count = 1;
   int jobs = 1;
+  bool empty = false;
 };
 
 /// The pilot and its backend.
@@ -105,6 +106,23 @@ std::vector<nlohmann::json> read_lines(const fs::path& path) {
   return lines;
 }
 
+/// Of flights without a target.
+void sum_up_alarms(const std::vector<nlohmann::json>& flights, Console& console) {
+  long frames = 0;
+  long sightings = 0;
+  int believed = 0;
+  for (const nlohmann::json& flight : flights) {
+    frames += flight.at("frames").get<long>();
+    sightings += flight.at("sightings").get<long>();
+    believed += flight.at("changes").empty() ? 0 : 1;
+  }
+  console.out() << fmt::format(
+      "\n| flights without target | frames | false alarms per 1,000 frames | flights with one believed |\n"
+      "|---|---|---|---|\n| {} | {} | {:.2f} | {} |\n",
+      flights.size(), frames, 1000.0 * static_cast<double>(sightings) / static_cast<double>(std::max(1L, frames)),
+      believed);
+}
+
 void sum_up(const std::vector<nlohmann::json>& flights, Console& console) {
   int docked = 0;
   int gaps = 0;
@@ -127,7 +145,7 @@ void sum_up(const std::vector<nlohmann::json>& flights, Console& console) {
 }
 
 int fly_many(const FlightCommand& command, Console& console) {
-  const fs::path path = fs::path(command.out) / "flights.jsonl";
+  const fs::path path = fs::path(command.out) / (command.empty ? "empty.jsonl" : "flights.jsonl");
   std::vector<nlohmann::json> flights = read_lines(path);
   std::set<std::uint64_t> flown;
   for (const nlohmann::json& flight : flights) flown.insert(flight.at("seed").get<std::uint64_t>());
@@ -151,7 +169,8 @@ int fly_many(const FlightCommand& command, Console& console) {
         if (k >= seeds.size()) return;
         // A new pilot each: nothing of one flight may reach the next.
         const Crew crew(command);
-        const std::string line = to_json_line(fly(navset::Flight(seeds[k], command.frames), seeds[k], *crew.pilot));
+        const std::string line =
+            to_json_line(fly(navset::Flight(seeds[k], command.frames, !command.empty), seeds[k], *crew.pilot));
         const std::lock_guard<std::mutex> lock(mutex);
         file << line << '\n' << std::flush;
         flights.push_back(nlohmann::json::parse(line));
@@ -172,8 +191,12 @@ int fly_many(const FlightCommand& command, Console& console) {
   for (std::thread& crew : crews) crew.join();
   if (!failure.empty()) throw Error(failure);
   if (!file) throw Error(path.string() + ": writing failed; check the disk's space");
-  sum_up(flights, console);
   console.out() << "log         " << path.string() << '\n';
+  if (command.empty) {
+    sum_up_alarms(flights, console);
+    return kOk;
+  }
+  sum_up(flights, console);
   const bool all = std::all_of(flights.begin(), flights.end(),
                                [](const nlohmann::json& flight) { return flight.at("docked").get<bool>(); });
   return all ? kOk : kNoResult;
@@ -196,6 +219,7 @@ void add_flight(CLI::App& app, Console& console, int& exit_code) {
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command->add_option("--jobs", options->jobs, "flights at a time")->check(CLI::Range(1, 256))->capture_default_str();
+  command->add_flag("--empty", options->empty, "without the target: how often something else is taken for it");
   command->add_option("--out", options->out, "folder for logs and pictures")->type_name("DIR")->capture_default_str();
   add_backend_options(*command, options->engine);
   command->footer(kExamples);
@@ -206,7 +230,7 @@ void add_flight(CLI::App& app, Console& console, int& exit_code) {
     if (error) {
       throw Error(options->out + ": the folder cannot be made (" + error.message() + "); name another by --out");
     }
-    exit_code = options->count == 1 ? fly_one(*options, console) : fly_many(*options, console);
+    exit_code = options->count == 1 && !options->empty ? fly_one(*options, console) : fly_many(*options, console);
   });
 }
 

@@ -18,6 +18,7 @@ FlightPoint point_of(int index, const navset::FlightFrame& truth, const PilotFra
   point.change = found.change;
   point.true_range_m = length(truth.target.t);
   point.has_position = found.has_position;
+  point.sighted = found.looked_for_target && found.sighting->status == FrameStatus::ok;
   if (!found.has_position) return point;
   point.from_marker = found.from_marker;
   point.range_m = length(found.position_m);
@@ -56,6 +57,11 @@ int FlightLog::wrong() const {
       std::count_if(points.begin(), points.end(), [](const FlightPoint& point) { return point.wrong(); }));
 }
 
+int FlightLog::sightings() const {
+  return static_cast<int>(
+      std::count_if(points.begin(), points.end(), [](const FlightPoint& point) { return point.sighted; }));
+}
+
 PilotConfig flight_pilot(const std::string& network) {
   PilotConfig config;
   config.detector.camera = navset::Flight::camera();
@@ -91,6 +97,7 @@ std::string to_json_line(const FlightLog& log) {
   line["docking_from"] = log.first(Mode::docking);
   line["longest_gap"] = log.longest_gap();
   line["wrong"] = log.wrong();
+  line["sightings"] = log.sightings();
   line["changes"] = nlohmann::ordered_json::array();
   for (const FlightPoint& point : log.points) {
     if (point.change.empty()) continue;

@@ -15,6 +15,8 @@ struct FlightPoint {
   Mode mode = Mode::search;
   std::string change;
   bool has_position = false, from_marker = false;
+  /// The network saw a target, whether or not the mode believed it.
+  bool sighted = false;
   /// Distance from the camera to the target's centre, m.
   double true_range_m = 0, range_m = 0, range_deviation_m = 0;
   /// Between the true and the found direction, as a share of the target's diameter in the image.
@@ -34,6 +36,7 @@ struct FlightLog {
   /// Frames with neither marker nor sighting running, from the first position on.
   int longest_gap() const;
   int wrong() const;
+  int sightings() const;
   bool docked() const { return !points.empty() && points.back().mode == Mode::docking && points.back().from_marker; }
 };
 
@@ -44,8 +47,8 @@ PilotConfig flight_pilot(const std::string& network);
 using FlightWatcher = std::function<void(const navset::FlightFrame&, const PilotFrame&)>;
 FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const FlightWatcher& seen = {});
 
-/// A JSON line: seed, title, docked, first frames, longest gap, wrong frames, every change of mode with its reason,
-/// median errors of range and direction by what gave the position.
+/// A JSON line: seed, title, docked, first frames, longest gap, wrong frames, sightings, every change of mode with its
+/// reason, median errors of range and direction by what gave the position.
 std::string to_json_line(const FlightLog& log);
 
 }  // namespace berth::cli

@@ -23,7 +23,8 @@ const T& pick(sim::Random& random, const std::vector<T>& from) {
 
 double Flight::Swing::at(double u) const { return sim::exact_sin(2 * sim::kPi * (turns * u + phase)); }
 
-Flight::Flight(u64 seed, int frames) : seed_(sim::scatter(seed)), frames_(frames) {
+Flight::Flight(u64 seed, int frames, bool with_target)
+    : seed_(sim::scatter(seed)), frames_(frames), with_target_(with_target) {
   sim::Random random(seed_);
   livery_ = &pick(random, liveries());
   model_ = target_model(*livery_, random.bits());
@@ -96,7 +97,7 @@ FlightFrame Flight::frame(int index) const {
   FlightFrame frame;
   place(u, frame);
   Scene scene;
-  scene.place(model_, frame.target, 1, Owner::target);
+  if (with_target_) scene.place(model_, frame.target, 1, Owner::target);
   Camera pinhole;
   pinhole.width = kWidth_px;
   pinhole.height = kHeight_px;

@@ -30,7 +30,8 @@ class Flight {
  public:
   static constexpr double kFrom_m = 6, kTo_m = 0.15;
 
-  Flight(u64 seed, int frames);
+  /// Without its target a flight shows how often something else is taken for it.
+  Flight(u64 seed, int frames, bool with_target = true);
 
   /// 640 x 480, the docking camera's focal length, no distortion.
   static CameraModel camera();
@@ -51,6 +52,7 @@ class Flight {
 
   u64 seed_;
   int frames_;
+  bool with_target_;
   const Livery* livery_;
   Model model_;
   BackdropKind kind_;
