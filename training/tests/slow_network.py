@@ -85,7 +85,7 @@ def max_pool(x, kernel, stride):
 
 
 def multiply(v, m, k):
-    return (v * m + (1 << (k - 1))) >> k
+    return min(2**30, max(-2**30, (v * m + (1 << (k - 1))) >> k))
 
 
 def score_q15(absent, present, m, k, logistic):
