@@ -1,67 +1,45 @@
 """A trained run as it goes into quantisation: its newest weights without batch normalisation, step by step."""
 import json
 import pathlib
-from dataclasses import dataclass
 
-import numpy as np
 import torch
-import torch.nn.functional as F
 
-from batches import normalised
-from model import Network
+from float_network import Connected, Convolution, FloatNetwork, Heads, Norm, Pool
+from model import SIDE, Network
 from train import INPUT_SCALE
 
 
-@dataclass
-class Step:
-    """name and title of an integer layer, x: what comes out of it in float, sums: before ReLU, where there is one."""
-    name: str
-    x: torch.Tensor
-    sums: torch.Tensor = None
+def weighted_modules(network):
+    """Convolutions and fully connected layers by step, without the heads."""
+    return {**{f"conv{i}": conv for i, conv in enumerate(network.convs, 1)},
+            **{f"fc{i}": layer for i, layer in enumerate(network.hidden, len(network.convs) + 1)}}
 
 
-class FloatRun:
+def layers_of(network):
+    """A Network without batch normalisation, layer by layer, with its weights of now."""
+    layers, side = [], SIDE
+    for i, (spec, conv) in enumerate(zip(network.specs, network.convs), 1):
+        weights, bias = conv.weight.detach(), conv.bias.detach()
+        layers.append(Convolution(f"conv{i}", weights, bias, (spec.stride,) * 2, (spec.pad,) * 2, spec.groups))
+        layers.append(Norm(f"norm{i}", network.lrn.alpha * 5))
+        side = (side + 2 * spec.pad - spec.kernel) // spec.stride + 1
+        if spec.pool:
+            layers.append(Pool(f"pool{i}", 3, 2))
+            side = (side - 3) // 2 + 1
+    for i, layer in enumerate(network.hidden, len(network.convs) + 1):
+        weights = layer.weight.detach()
+        layers.append(Connected(f"fc{i}", weights.reshape(len(weights), -1, side, side), layer.bias.detach()))
+        side = 1
+    heads = (network.score, network.geometry)
+    layers.append(Heads("heads", *(torch.cat([getattr(head, part).detach() for head in heads]) for part in ("weight", "bias"))))
+    return layers
+
+
+class FloatRun(FloatNetwork):
     def __init__(self, network, settings, mean, iteration, name, device="cpu"):
         self.network = network.eval().folded().to(device)
-        self.settings, self.mean, self.iteration, self.name, self.device = settings, mean, iteration, name, device
-
-    def input(self, images):
-        """float[n, 1, 256, 256] from u8[n, 256, 256], as in training."""
-        grey = normalised(images) if self.settings["normalise"] else images
-        x = torch.from_numpy(grey.astype(np.float32))
-        return ((x - self.mean) * INPUT_SCALE)[:, None].to(self.device)
-
-    @torch.no_grad()
-    def steps(self, x):
-        """One Step for each layer of the integer network."""
-        network = self.network
-        for i, (spec, conv) in enumerate(zip(network.specs, network.convs), 1):
-            sums = conv(x)
-            x = F.relu(sums)
-            yield Step(f"conv{i}", x, sums)
-            x = network.lrn(x)
-            yield Step(f"norm{i}", x)
-            if spec.pool:
-                x = F.max_pool2d(x, 3, 2)
-                yield Step(f"pool{i}", x)
-        x = x.flatten(1)
-        for i, layer in enumerate(network.hidden, len(network.convs) + 1):
-            sums = layer(x)
-            x = F.relu(sums)
-            yield Step(f"fc{i}", x[:, :, None, None], sums[:, :, None, None])
-        heads = torch.cat([network.score(x), network.geometry(x)], 1)[:, :, None, None]
-        yield Step("heads", heads, heads)
-
-    def outputs(self, images, batch=10, progress=None):
-        """float64[n, 5]: two scores, three numbers of geometry."""
-        out = []
-        for first in range(0, len(images), batch):
-            for step in self.steps(self.input(images[first:first + batch])):
-                pass
-            out.append(step.x.flatten(1).cpu().double().numpy())
-            if progress:
-                progress(min(len(images), first + batch))
-        return np.concatenate(out)
+        super().__init__(layers_of(self.network), settings["normalise"], mean, INPUT_SCALE, name, device)
+        self.settings, self.iteration = settings, iteration
 
 
 def newest(folder):

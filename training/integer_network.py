@@ -23,11 +23,11 @@ def logistic_table():
     return np.round(32768 / (1 + np.exp(-np.arange(-2048, 2048) / 256))).astype(np.uint16)
 
 
-def norm_table(sigma_in, sigma_out, alpha):
+def norm_table(sigma_in, sigma_out, alpha, beta=0.75, offset=1.0):
     """s32[104] of local_response_norm: knots every 32 below 2048, from there every 1024. sigma: value of an activation
     of 1; alpha as trained, of a mean over five channels."""
     knots = np.concatenate([np.arange(64) * 32, 2048 + np.arange(40) * 1024])
-    factor = (1 + alpha / 5 * 2 * knots * sigma_in**2) ** -0.75
+    factor = (offset + alpha / 5 * 2 * knots * sigma_in**2) ** -beta
     return np.round(2**14 * (sigma_in / sigma_out) * factor).astype(np.int32)
 
 

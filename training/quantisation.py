@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+import float_network
 import model_file
 from integer_network import IntegerNetwork, logistic_table, norm_table
-from model_file import LARGEST_SUM, Convolve, FullyConnected, Heads, LocalResponseNorm, MaxPool, Model, largest_sum
-from train import INPUT_SCALE
+from model_file import LARGEST_SUM, Convolve, FullyConnected, LocalResponseNorm, MaxPool, Model, largest_sum
 
 METHODS = ("max", "99.99 %", "99.9 %", "least squares")
 BINS = 4096
 
 
 class Ranges:
-    """What the activations of a float run are like on some images: greatest values and histograms a step, greatest
+    """What the activations of a float network are like on some images: greatest values and histograms a step, greatest
     value and mean before ReLU a channel."""
 
     def __init__(self, run, images, batch=4):
@@ -55,15 +55,16 @@ class Ranges:
 @dataclass
 class Quantised:
     """A Model with what its numbers are worth. sigmas: by step, of its output. units: by weighted step, of 1 in its
-    accumulators, per channel."""
+    accumulators, per channel. input_sigma: of the model's input."""
     model: Model
     names: list
     sigmas: dict
     units: dict
+    input_sigma: float
 
     def scales(self):
         """By weighted step: the value of a weight of 1, per channel."""
-        before = dict(zip(self.names, [INPUT_SCALE, *(self.sigmas[name] for name in self.names)]))
+        before = dict(zip(self.names, [self.input_sigma, *(self.sigmas[name] for name in self.names)]))
         return {name: unit / before[name] for name, unit in self.units.items()}
 
 
@@ -124,13 +125,27 @@ def held_bias(bias, integers, shift, largest_input):
     return np.clip(np.round(bias), -room, room).astype(np.int32)
 
 
-def folded_input(weights):
-    """[out, 4, rows, words] from [out, 1, rows, columns]: four pixels a word, what is missing of the last one 0."""
+def folded_input(weights, left=0, words=None):
+    """[out, 4, rows, words] from [out, 1, rows, columns]: four pixels a word, `left` columns of 0 before and as many as
+    are missing behind."""
     out, _, rows, columns = weights.shape
-    words = (columns + 3) // 4
+    words = words or (left + columns + 3) // 4
     padded = np.zeros((out, rows, words * 4), weights.dtype)
-    padded[:, :, :columns] = weights[:, 0]
+    padded[:, :, left:left + columns] = weights[:, 0]
     return padded.reshape(out, rows, words, 4).transpose(0, 3, 1, 2)
+
+
+def folded_columns(kernel, stride, pad, width=model_file.SIDE):
+    """(columns of 0 on the left, words of the kernel, words of padding) of a first layer that reads four pixels a word;
+    stride, a multiple of 4, and pad in pixels."""
+    if stride % 4:
+        raise DoesNotFit(f"a stride of {stride} in the first layer, which reads four pixels at a time: must be 4, 8, ...")
+    pad_words = (pad + 3) // 4
+    left = 4 * pad_words - pad
+    words, wanted = (left + kernel + 3) // 4, (width + 2 * pad - kernel) // stride
+    while (width // 4 + 2 * pad_words - words) // (stride // 4) > wanted:
+        words += 1  # a wider kernel, of 0 there, stops where the pixels' does
+    return left, words, pad_words
 
 
 def fixed_point(factor):
@@ -141,92 +156,88 @@ def fixed_point(factor):
     return min(round(factor * 2.0**k), 2**30 - 1), k
 
 
-def weighted_modules(network):
-    """Convolutions and fully connected layers by step, without the heads."""
-    return {**{f"conv{i}": conv for i, conv in enumerate(network.convs, 1)},
-            **{f"fc{i}": layer for i, layer in enumerate(network.hidden, len(network.convs) + 1)}}
+def _arrays(layer):
+    return layer.weights.cpu().numpy(), layer.bias.cpu().double().numpy()
 
 
 class Builder:
-    """Builds integer networks of one run for any choice of sigmas. scales: of the weights, by step, where they are
-    given (after fine-tuning)."""
+    """Builds integer networks of one float network for any choice of sigmas. scales: of the weights, by step, where they
+    are given (after fine-tuning)."""
 
     def __init__(self, run, ranges, scales=None):
         self.run, self.ranges, self.scales = run, ranges, scales or {}
-        self.weights = weighted_modules(run.network)
 
-    def _float(self, module):
-        return module.weight.detach().cpu().numpy(), module.bias.detach().cpu().double().numpy()
+    def _mean(self):
+        """What integers take off grey levels. 128 clamps no pixel, the mean goes into the bias; but beyond the border
+        integers see what was taken off, which has to be the mean where there is padding."""
+        if self.run.normalise:
+            return 0
+        return min(255, max(0, round(self.run.mean))) if max(self.run.layers[0].pad) else 128
 
-    def _layer(self, name, sigma_in, sigma_out, convert, bias_shift=0.0):
-        weights, bias = self._float(self.weights[name])
-        first = name == "conv1"
-        try:
-            return requantised_layer(convert(weights), bias + bias_shift, sigma_in, sigma_out,
-                                     self.ranges.channel_largest[name], 128 if first else 127, self.scales.get(name))
-        except DoesNotFit as error:
-            raise DoesNotFit(f"{name}: {error}") from None
+    def _folded(self, layer, weights, bias):
+        """The first layer's weights, bias, stride and pad for words of four pixels."""
+        (rows, columns), pad = layer.stride, layer.pad
+        left, words, pad_words = folded_columns(weights.shape[3], columns, pad[1])
+        if not self.run.normalise:
+            bias = bias + weights.sum((1, 2, 3)) * (self._mean() - self.run.mean) * self.run.scale
+        return folded_input(weights, left, words), bias, (rows, columns // 4), (pad[0], pad_words)
+
+    def _requantised(self, layer, weights, bias, sigma_in, sigma_out, first):
+        return requantised_layer(weights, bias, sigma_in, sigma_out, self.ranges.channel_largest[layer.name],
+                                 128 if first else 127, self.scales.get(layer.name))
+
+    def _built(self, layer, sigma, sigma_out, first):
+        """(integer layer, unit or None)"""
+        if isinstance(layer, float_network.Norm):
+            table = norm_table(sigma, sigma_out, layer.alpha, layer.beta, layer.offset)
+            if table.max() >= 2**16:
+                raise DoesNotFit(f"it makes activations up to {table.max() / 2**14:.3g} times as large: must be below 4")
+            return LocalResponseNorm(table), None
+        if isinstance(layer, float_network.Pool):
+            return MaxPool(layer.kernel, layer.stride), None
+        weights, bias = _arrays(layer)
+        if isinstance(layer, float_network.Heads):
+            return self._heads(layer.name, weights, bias, sigma)
+        if isinstance(layer, float_network.Connected):
+            *integers, unit = self._requantised(layer, weights.transpose(0, 2, 3, 1), bias, sigma, sigma_out, first)
+            return FullyConnected(*integers), unit
+        stride, pad = layer.stride, layer.pad
+        if first:
+            weights, bias, stride, pad = self._folded(layer, weights, bias)
+        *integers, unit = self._requantised(layer, weights, bias, sigma, sigma_out, first)
+        return Convolve(*integers, stride, pad, layer.groups), unit
 
     def build(self, sigmas, name="", notes=""):
-        """Quantised; sigmas by name of conv, norm and fc steps."""
-        network, normalise = self.run.network, self.run.settings["normalise"]
-        layers, names, units, values = [], [], {}, dict(sigmas)
-        sigma, side = INPUT_SCALE, model_file.SIDE
-
-        def add(step, layer, unit=None):
-            names.append(step)
+        """Quantised; sigmas by name of all steps but pools and heads."""
+        run, sigma = self.run, self.run.scale
+        layers, units, values = [], {}, dict(sigmas)
+        for i, step in enumerate(run.layers):
+            try:
+                layer, unit = self._built(step, sigma, sigmas.get(step.name, sigma), i == 0)
+            except DoesNotFit as error:
+                raise DoesNotFit(f"{step.name}: {error}") from None
             layers.append(layer)
-            values[step] = sigma
+            sigma = values[step.name] = sigmas.get(step.name, sigma)
             if unit is not None:
-                units[step] = unit
-
-        for i, spec in enumerate(network.specs, 1):
-            step, stride, convert, bias_shift = f"conv{i}", (spec.stride, spec.stride), lambda weights: weights, 0.0
-            if i == 1:
-                words, word_stride = (spec.kernel + 3) // 4, spec.stride // 4
-                if spec.pad or spec.stride % 4 or (side // 4 - words) // word_stride != (side - spec.kernel) // spec.stride:
-                    raise DoesNotFit("conv1: only strides of 4, 8, ... without padding are taken four pixels a word")
-                stride, convert = (spec.stride, word_stride), folded_input
-                # Integers take 128 off instead of the training mean, so that no pixel is clamped.
-                if not normalise:
-                    bias_shift = self._float(self.weights[step])[0].sum((1, 2, 3)) * (128 - self.run.mean) * INPUT_SCALE
-            weights, bias, multiplier, shift, unit = self._layer(step, sigma, sigmas[step], convert, bias_shift)
-            sigma = sigmas[step]
-            add(step, Convolve(weights, bias, multiplier, shift, stride, (spec.pad, spec.pad), spec.groups), unit)
-            table = norm_table(sigma, sigmas[f"norm{i}"], network.lrn.alpha * 5)
-            sigma = sigmas[f"norm{i}"]
-            add(f"norm{i}", LocalResponseNorm(table))
-            side = (side + 2 * spec.pad - spec.kernel) // spec.stride + 1
-            if spec.pool:
-                add(f"pool{i}", MaxPool(3, 2))
-                side = (side - 3) // 2 + 1
-        channels = network.specs[-1].channels
-        for i in range(len(network.specs) + 1, len(network.specs) + 1 + len(network.hidden)):
-            step, shape = f"fc{i}", (channels, side, side)
-            # torch flattens channels, rows, columns
-            weights, bias, multiplier, shift, unit = self._layer(
-                step, sigma, sigmas[step], lambda w, shape=shape: w.reshape(-1, *shape).transpose(0, 2, 3, 1))
-            sigma = sigmas[step]
-            add(step, FullyConnected(weights, bias, multiplier, shift), unit)
-            channels, side = len(weights), 1
-        heads, unit = self._heads(sigma)
-        add("heads", heads, unit)
-        outputs = [fixed_point(256 * unit[0]), fixed_point(128 * 65536 * unit[2]), fixed_point(128 * 65536 * unit[3]),
-                   fixed_point(65536 / math.log(2) * unit[4])]
-        model = Model(name, notes, int(normalise), 0 if normalise else 128, layers, outputs, logistic_table())
+                units[step.name] = unit
+        unit = units[run.layers[-1].name]
+        outputs = [fixed_point(256 * unit[0])]
+        if len(unit) == 5:
+            outputs += [fixed_point(factor * unit[2 + i]) for i, factor in enumerate((2**23, 2**23, 2**16 / math.log(2)))]
+        else:
+            outputs += [(0, 1)] * 3
+        model = Model(name, notes, int(run.normalise), self._mean(), layers, outputs, logistic_table())
         model_file.shapes(model)
-        return Quantised(model, names, values, units)
+        return Quantised(model, [step.name for step in run.layers], values, units, run.scale)
 
-    def _heads(self, sigma):
-        (score, score_bias), (geometry, geometry_bias) = (self._float(head) for head in (self.run.network.score,
-                                                                                         self.run.network.geometry))
-        scale = self.scales.get("heads")
+    def _heads(self, name, weights, bias, sigma):
+        scale = self.scales.get(name)
         if scale is None:
-            scale = _natural_scale(np.concatenate([score, geometry]))
+            scale = _natural_scale(weights)
             scale[:2] = scale[:2].max()  # two scores are compared: one scale
-        integers = weights_in(np.concatenate([score, geometry]), scale)
+        integers = weights_in(weights, scale)
         unit = scale * sigma
-        return Heads(integers, held_bias(np.concatenate([score_bias, geometry_bias]) / unit, integers, 0, 127)), unit
+        return model_file.Heads(integers, held_bias(bias / unit, integers, 0, 127)), unit
 
 
 def correct_biases(quantised, ranges):
@@ -246,8 +257,8 @@ def correct_biases(quantised, ranges):
 
 
 def dequantised(quantised, raw):
-    """float64[n, 5] of raw heads."""
-    return raw * quantised.units["heads"]
+    """float64[n, 5 or 2] of raw heads."""
+    return raw * quantised.units[quantised.names[-1]]
 
 
 def signal_to_noise(quantised, run, images):
@@ -257,11 +268,12 @@ def signal_to_noise(quantised, run, images):
     x, before, out = network.input(images), network.input(images), {}
     for name, layer, step in zip(quantised.names, network.layers, run.steps(run.input(images))):
         x, alone = layer(x), layer(before)
-        unit = quantised.units["heads"] if name == "heads" else quantised.sigmas[name]
+        last = name == quantised.names[-1]
+        unit = quantised.units[name] if last else quantised.sigmas[name]
         exact = step.x.cpu().double().numpy()
         value = np.asarray(unit).reshape(-1, 1, 1)
         out[name] = tuple(10 * math.log10((exact**2).sum() / max(((got.cpu().numpy() * value - exact) ** 2).sum(), 1e-30))
                           for got in (x, alone))
-        if name != "heads":
+        if not last:
             before = (step.x / quantised.sigmas[name]).round_().clamp_(0, 127).to(torch.int32)
     return out

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+import float_network
 import float_run
 import model_file
 from batches import Samples
@@ -17,7 +18,7 @@ from fine_tune import FineTuner, SimulatedNetwork
 from integer_network import IntegerNetwork
 from navset import NavSet
 from progress import Progress
-from quantisation import METHODS, Builder, DoesNotFit, Ranges, correct_biases, dequantised, signal_to_noise, weighted_modules
+from quantisation import METHODS, Builder, DoesNotFit, Ranges, correct_biases, dequantised, signal_to_noise
 
 
 @dataclass
@@ -38,12 +39,17 @@ class Difference:
 
 
 def difference(got, exact, targets):
-    """got, exact: float64[n, 5]."""
+    """got, exact: float64[n, 5 or 2]."""
     logits = [np.clip(heads[:, 1] - heads[:, 0], -8, 8) for heads in (got, exact)]
     changed = int(((logits[0] >= 0) != (logits[1] >= 0)).sum())
     rms = float(np.sqrt(np.mean((logits[0] - logits[1]) ** 2)))
     off = (got - exact)[targets, 2:]
     return Difference(changed, rms, float(np.sqrt(np.mean(off**2))) if off.size else 0.0)
+
+
+def scaled(layers):
+    """Names of the steps that have a sigma of their own."""
+    return [layer.name for layer in layers if not isinstance(layer, (float_network.Pool, float_network.Heads))]
 
 
 class Search:
@@ -56,8 +62,11 @@ class Search:
     def sigmas(self, methods):
         """methods: by step. A norm's `same` is its input's sigma: nothing is rounded twice where it changes little."""
         out = {}
-        for name, method in methods.items():
-            out[name] = out["conv" + name[4:]] if method == "same" else self.ranges.sigma(name, method)
+        for layer in self.run.layers:
+            if layer.name in methods:
+                method = methods[layer.name]
+                sigma = sigma if method == "same" else self.ranges.sigma(layer.name, method)
+                out[layer.name] = sigma
         return out
 
     def tried(self, methods, corrected=False):
@@ -75,22 +84,25 @@ class Search:
         return difference(dequantised(quantised, got), self.exact, self.targets)
 
     def names(self):
-        return [name for name in self.ranges.largest if name.startswith(("conv", "norm", "fc"))]
+        return scaled(self.run.layers)
 
     def alternatives(self):
         """(step, method) pairs worth a try. A normalisation that takes less than a tenth off keeps its input's sigma."""
-        largest = self.ranges.largest
-        for name in self.names():
-            if name.startswith("norm") and largest[name] > 0.9 * largest["conv" + name[4:]]:
+        largest, layers = self.ranges.largest, self.run.layers
+        for before, layer in zip([None, *layers], layers):
+            if layer.name not in self.names():
+                continue
+            if isinstance(layer, float_network.Norm) and largest[layer.name] > 0.9 * largest[before.name]:
                 continue
             for method in METHODS:
-                yield name, method
+                yield layer.name, method
 
     def best(self, report, progress=None):
         """The methods by step that came out best: the best one for all, then layer by layer."""
         names, tries = self.names(), []
+        norms = {layer.name for layer in self.run.layers if isinstance(layer, float_network.Norm)}
         for method in METHODS:
-            methods = {name: "same" if name.startswith("norm") else method for name in names}
+            methods = {name: "same" if name in norms else method for name in names}
             _, found = self.tried(methods)
             report(f"| all {method} | {found or 'does not fit'} |")
             if found:
@@ -123,7 +135,7 @@ def layer_table(quantised, methods, noise):
     yield "| layer | greatest | by | shift | M | weights' greatest | dB so far | dB alone |"
     yield "|---|---|---|---|---|---|---|---|"
     for name, layer in zip(quantised.names, quantised.model.layers):
-        greatest = "" if name == "heads" else f"{127 * quantised.sigmas[name]:.3g}"
+        greatest = "" if isinstance(layer, model_file.Heads) else f"{127 * quantised.sigmas[name]:.3g}"
         shift = multipliers = weights = ""
         if hasattr(layer, "shift"):
             shift, multipliers = layer.shift, f"{layer.multiplier.min()} to {layer.multiplier.max()}"
@@ -145,17 +157,42 @@ def notes_of(run, folders):
             f"{run.settings['seed']}; trained on {trained}; calibrated on {calibrated}")
 
 
+def quantised_well(run, images, search_images, targets, name, notes):
+    """(Quantised, methods by step, Ranges, Search or None) of a float network; prints the choice. images: for the ranges;
+    search_images: for the choice of methods, of them `targets` show one. No search_images: least squares."""
+    ranges, search = Ranges(run, images), None
+    if len(search_images):
+        print("\n| methods | changed against float |\n|---|---|", flush=True)
+        search = Search(run, ranges, search_images, targets)
+        methods = search.best(lambda line: print(line, flush=True), Progress("choosing", 1))
+        sigmas = search.sigmas(methods)
+    else:
+        methods = {name: "least squares" for name in scaled(run.layers)}
+        sigmas = {name: ranges.sigma(name, method) for name, method in methods.items()}
+    builder = Builder(run, ranges)
+    quantised = builder.build(sigmas, name, notes)
+    plain = search.measured(quantised) if search else None
+    correct_biases(quantised, ranges)
+    if search:
+        corrected = search.measured(quantised)
+        print(f"| biases corrected | {corrected} |", flush=True)
+        if corrected.error > plain.error:
+            quantised = builder.build(sigmas, name, notes)
+    return quantised, methods, ranges, search
+
+
 def fine_tuned(run, quantised, samples, images, sigmas, arguments):
     """The network trained on with its rounding; `run` is left with the weights that came out."""
     scales = quantised.scales()
     simulated = SimulatedNetwork(run.network, quantised.sigmas, scales)
-    for name, module in weighted_modules(run.network).items():  # start where the correction has left the biases
+    for name, module in float_run.weighted_modules(run.network).items():  # start where the correction has left the biases
         layer = quantised.model.layers[quantised.names.index(name)]
         if name != "conv1" or run.settings["normalise"]:
             module.bias.data = torch.from_numpy(layer.bias * quantised.units[name]).to(module.bias)
     tuner = FineTuner(simulated, run.settings, run.mean, samples, arguments.fine_tune, arguments.learning_rate, run.device)
     before, after = tuner.tune(Progress("fine-tuning", arguments.fine_tune))
     print(f"\nFine-tuning, {arguments.fine_tune} iterations: loss {before:.5f} to {after:.5f}.")
+    run.layers = float_run.layers_of(run.network)
     tuned = Builder(run, Ranges(run, images), scales)
     return tuned.build(sigmas, quantised.model.name, f"{quantised.model.notes}; fine-tuned {arguments.fine_tune} "
                        f"iterations at {arguments.learning_rate:g}")
@@ -183,29 +220,16 @@ def main():
         run = float_run.load(arguments.run, device)
         samples, order = chosen_images(arguments.calibrate, arguments.images + arguments.search_images, arguments.seed)
         for_ranges, for_search = order[:arguments.images], order[arguments.images:]
-        ranges = Ranges(run, samples.images(for_ranges))
         print(f"{run.name}, iteration {run.iteration}; {len(for_ranges)} images for ranges, {len(for_search)} for the "
               "choice")
-        if len(for_search):
-            print("\n| methods | changed against float |\n|---|---|", flush=True)
-            search = Search(run, ranges, samples.images(for_search), samples.present[for_search] > 0)
-            methods = search.best(lambda line: print(line, flush=True), Progress("choosing", 1))
-            sigmas = search.sigmas(methods)
-        else:
-            methods = {n: "least squares" for n in ranges.largest if n.startswith(("conv", "norm", "fc"))}
-            sigmas = {name: ranges.sigma(name, method) for name, method in methods.items()}
-        name, notes = arguments.name or run.name, notes_of(run, arguments.calibrate)
-        quantised = Builder(run, ranges).build(sigmas, name, notes)
-        plain = search.measured(quantised) if len(for_search) else None
-        correct_biases(quantised, ranges)
-        if plain:
-            corrected = search.measured(quantised)
-            print(f"| biases corrected | {corrected} |", flush=True)
-            if corrected.error > plain.error:
-                quantised = Builder(run, ranges).build(sigmas, name, notes)
+        search_images = samples.images(for_search) if len(for_search) else []
+        quantised, methods, ranges, search = quantised_well(
+            run, samples.images(for_ranges), search_images, samples.present[for_search] > 0, arguments.name or run.name,
+            notes_of(run, arguments.calibrate))
         if arguments.fine_tune:
+            sigmas = {name: quantised.sigmas[name] for name in methods}
             quantised = fine_tuned(run, quantised, samples, ranges.images, sigmas, arguments)
-            if len(for_search):
+            if search:
                 print(f"| fine-tuned | {search.measured(quantised)} |")
         print()
         for line in layer_table(quantised, methods, signal_to_noise(quantised, run, ranges.images[:50])):
