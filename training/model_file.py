@@ -12,6 +12,7 @@ MAGIC = b"BERTHNET"
 VERSION = 1
 SIDE = 256
 LARGEST_SUM = 2**31 - 1
+LARGEST_KERNEL, MOST_CHANNELS, LARGEST_TENSOR, MOST_LAYERS = 64, 16384, 1 << 24, 64  # as Berth's reader has them
 OUTPUTS = ("score", "x", "y", "d")
 DAMAGED = "the file is damaged: fetch or export it again"
 
@@ -171,23 +172,40 @@ def _heads_shape(layer, shape, first):
     return shape[0], shape[1], out
 
 
+def _check_limits(layer, shape):
+    height, width, channels = shape
+    _require(channels <= MOST_CHANNELS, f"{channels} channels, at most {MOST_CHANNELS} are read")
+    _require(height * width * ((channels + 3) // 4 * 4) <= LARGEST_TENSOR,
+             f"gives {height} x {width} x {channels} activations, at most {LARGEST_TENSOR} are held")
+    if isinstance(layer, Convolve):
+        sizes = layer.weights.shape[2:] + tuple(layer.stride)
+    elif isinstance(layer, FullyConnected):
+        sizes = layer.weights.shape[1:3]
+    else:
+        sizes = (layer.kernel, layer.stride) if isinstance(layer, MaxPool) else (1,)
+    _require(max(sizes) <= LARGEST_KERNEL, f"a kernel or stride of {max(sizes)}, at most {LARGEST_KERNEL} is read")
+
+
 _SHAPE_AFTER = {Convolve: _convolve_shape, LocalResponseNorm: _norm_shape, MaxPool: _pool_shape,
                 FullyConnected: _connected_shape, Heads: _heads_shape}
 
 
-def shapes(model):
-    """(height, width, channels) after each layer for one window; ModelError if the model does not fit together."""
+def shapes(model, names=None):
+    """(height, width, channels) after each layer for one window; ModelError if the model does not fit together, by `names`
+    of the layers where they are given."""
     _require(model.side == SIDE, f"input side is {model.side}, must be {SIDE}; {DAMAGED}")
     _require(model.normalise in (0, 1), f"normalise is {model.normalise}, must be 0 or 1; {DAMAGED}")
     _require(0 <= model.mean <= 255, f"mean is {model.mean}, must be 0 to 255; {DAMAGED}")
+    _require(len(model.layers) <= MOST_LAYERS, f"{len(model.layers)} layers, at most {MOST_LAYERS} are read")
     _require(model.layers and isinstance(model.layers[-1], Heads), "its last layer is not heads; export the model again")
     shape, out = (model.side, model.side // 4, 4), []
     for i, layer in enumerate(model.layers):
         try:
             _require(not isinstance(layer, Heads) or i == len(model.layers) - 1, "comes before the last layer")
             shape = _SHAPE_AFTER[type(layer)](layer, shape, i == 0)
+            _check_limits(layer, shape)
         except ModelError as error:
-            raise ModelError(f"layer {i + 1} ({layer.title}): {error}") from None
+            raise ModelError(f"{names[i] if names else f'layer {i + 1}'} ({layer.title}): {error}") from None
         out.append(shape)
     _require(out[-1][:2] == (1, 1), f"its heads come out {out[-1][0]} x {out[-1][1]} times for one window, must be once")
     _require(len(model.outputs) == 4, f"{len(model.outputs)} output scales, must be 4")
@@ -280,7 +298,7 @@ def from_bytes(data):
     reader = _Reader(_body(bytes(data)))
     name, notes = reader.text("name"), reader.text("notes")
     side, normalise, mean, count = reader.integers("side normalise mean layers")
-    _require(1 <= count <= 1000, f"{count} layers, must be 1 to 1000; {DAMAGED}")
+    _require(1 <= count <= MOST_LAYERS, f"{count} layers, must be 1 to {MOST_LAYERS}; {DAMAGED}")
     layers = []
     for i in range(count):
         kind = reader.integer(f"layer {i + 1}: kind")

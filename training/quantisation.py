@@ -115,6 +115,13 @@ def requantised_layer(weights, bias, sigma_in, sigma_out, reach, largest_input, 
     return integers, held_bias(bias / unit, integers, shift, largest_input), multiplier, shift, unit
 
 
+def least_sigma(weights, sigma_in, scale=None):
+    """The smallest sigma of a layer's output for which M stays below 2^15: a single product may not be worth more than
+    the whole output."""
+    natural = _natural_scale(weights) if scale is None else scale
+    return float(natural.max() * sigma_in * 2**22 / 32767 * (1 + 1e-9))
+
+
 def held_bias(bias, integers, shift, largest_input):
     """s32 of a bias in accumulator units. One so far below 0 that the channel is silent anyway may end early; one that
     would overflow upwards is refused."""
@@ -186,40 +193,44 @@ class Builder:
         return requantised_layer(weights, bias, sigma_in, sigma_out, self.ranges.channel_largest[layer.name],
                                  128 if first else 127, self.scales.get(layer.name))
 
-    def _built(self, layer, sigma, sigma_out, first):
-        """(integer layer, unit or None)"""
-        if isinstance(layer, float_network.Norm):
-            table = norm_table(sigma, sigma_out, layer.alpha, layer.beta, layer.offset)
-            if table.max() >= 2**16:
-                raise DoesNotFit(f"it makes activations up to {table.max() / 2**14:.3g} times as large: must be below 4")
-            return LocalResponseNorm(table), None
-        if isinstance(layer, float_network.Pool):
-            return MaxPool(layer.kernel, layer.stride), None
-        weights, bias = _arrays(layer)
-        if isinstance(layer, float_network.Heads):
-            return self._heads(layer.name, weights, bias, sigma)
-        if isinstance(layer, float_network.Connected):
-            *integers, unit = self._requantised(layer, weights.transpose(0, 2, 3, 1), bias, sigma, sigma_out, first)
+    def _weighted(self, step, sigma, sigma_out, first):
+        """(integer layer, unit) of a convolution or fully connected layer."""
+        weights, bias = _arrays(step)
+        if isinstance(step, float_network.Connected):
+            *integers, unit = self._requantised(step, weights.transpose(0, 2, 3, 1), bias, sigma, sigma_out, first)
             return FullyConnected(*integers), unit
-        stride, pad = layer.stride, layer.pad
+        stride, pad = step.stride, step.pad
         if first:
-            weights, bias, stride, pad = self._folded(layer, weights, bias)
-        *integers, unit = self._requantised(layer, weights, bias, sigma, sigma_out, first)
-        return Convolve(*integers, stride, pad, layer.groups), unit
+            weights, bias, stride, pad = self._folded(step, weights, bias)
+        *integers, unit = self._requantised(step, weights, bias, sigma, sigma_out, first)
+        return Convolve(*integers, stride, pad, step.groups), unit
+
+    def _unweighted(self, step, sigma, sigma_out):
+        if isinstance(step, float_network.Pool):
+            return MaxPool(step.kernel, step.stride)
+        table = norm_table(sigma, sigma_out, step.alpha, step.beta, step.offset)
+        if table.max() >= 2**16:
+            raise DoesNotFit(f"it makes activations up to {table.max() / 2**14:.3g} times as large: must be below 4")
+        return LocalResponseNorm(table)
 
     def build(self, sigmas, name="", notes=""):
-        """Quantised; sigmas by name of all steps but pools and heads."""
+        """Quantised; sigmas by name of all steps but pools and heads, as small as asked for where that fits."""
         run, sigma = self.run, self.run.scale
-        layers, units, values = [], {}, dict(sigmas)
+        layers, units, values = [], {}, {}
         for i, step in enumerate(run.layers):
+            sigma_out = sigmas.get(step.name, sigma)
             try:
-                layer, unit = self._built(step, sigma, sigmas.get(step.name, sigma), i == 0)
+                if isinstance(step, float_network.Heads):
+                    layer, units[step.name] = self._heads(step, sigma)
+                elif isinstance(step, (float_network.Norm, float_network.Pool)):
+                    layer = self._unweighted(step, sigma, sigma_out)
+                else:
+                    sigma_out = max(sigma_out, least_sigma(_arrays(step)[0], sigma, self.scales.get(step.name)))
+                    layer, units[step.name] = self._weighted(step, sigma, sigma_out, i == 0)
             except DoesNotFit as error:
                 raise DoesNotFit(f"{step.name}: {error}") from None
             layers.append(layer)
-            sigma = values[step.name] = sigmas.get(step.name, sigma)
-            if unit is not None:
-                units[step.name] = unit
+            sigma = values[step.name] = sigma_out
         unit = units[run.layers[-1].name]
         outputs = [fixed_point(256 * unit[0])]
         if len(unit) == 5:
@@ -227,11 +238,12 @@ class Builder:
         else:
             outputs += [(0, 1)] * 3
         model = Model(name, notes, int(run.normalise), self._mean(), layers, outputs, logistic_table())
-        model_file.shapes(model)
-        return Quantised(model, [step.name for step in run.layers], values, units, run.scale)
+        names = [step.name for step in run.layers]
+        model_file.shapes(model, names)
+        return Quantised(model, names, values, units, run.scale)
 
-    def _heads(self, name, weights, bias, sigma):
-        scale = self.scales.get(name)
+    def _heads(self, step, sigma):
+        (weights, bias), scale = _arrays(step), self.scales.get(step.name)
         if scale is None:
             scale = _natural_scale(weights)
             scale[:2] = scale[:2].max()  # two scores are compared: one scale
