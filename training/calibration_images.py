@@ -19,7 +19,7 @@ def window(path):
                 raise ValueError(f"{path}: {picture.mode} pixels of more than 8 bits; convert it to 8-bit grey")
             return np.array(ImageOps.fit(picture.convert("L"), (SIDE, SIDE), Image.Resampling.BOX))
     except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise ValueError(f"{path}: not a picture that can be read ({error}); replace it or take it out of the folder") from None
+        raise ValueError(f"{path}: not a picture that can be read ({error}); replace it or take it away") from None
 
 
 def load(folder, most, seed):
@@ -40,6 +40,7 @@ def load(folder, most, seed):
         paths = [paths[i] for i in random.permutation(len(paths))[:most]]
         images, present, words = [window(path) for path in paths], None, f"pictures of {folder.name}"
     if len(images) < FEWEST:
-        raise ValueError(f"{folder}: {len(images)} images ({', '.join(sorted(SUFFIXES))}, or a navigation set's training part); "
+        kinds = ", ".join(sorted(SUFFIXES))
+        raise ValueError(f"{folder}: {len(images)} images ({kinds}, or a navigation set's training part); "
                          f"at least {FEWEST} are needed, better some hundreds")
     return np.stack(images), present, f"{len(images)} images, {words}"

@@ -31,7 +31,8 @@ def layers_of(network):
         layers.append(Connected(f"fc{i}", weights.reshape(len(weights), -1, side, side), layer.bias.detach()))
         side = 1
     heads = (network.score, network.geometry)
-    layers.append(Heads("heads", *(torch.cat([getattr(head, part).detach() for head in heads]) for part in ("weight", "bias"))))
+    layers.append(Heads("heads",
+                        *(torch.cat([getattr(head, part).detach() for head in heads]) for part in ("weight", "bias"))))
     return layers
 
 

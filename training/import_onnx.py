@@ -40,8 +40,8 @@ def network_of(imported, arguments, name):
     if scale <= 0:
         raise ValueError(f"--scale is {scale:g}; it has to be above 0")
     if not arguments.normalise and max(first.pad) and abs(mean - 128) > CLAMPED:
-        raise Unsupported(f"{first.name}: pads are {list(first.pad)} in the first layer, around images of mean {mean:g}: what is "
-                          f"beyond the border counts as the mean, which has to be 128 +- {CLAMPED} for that; train it without "
+        raise Unsupported(f"{first.name}: pads are {list(first.pad)} in the first layer, around images of mean {mean:g}: "
+                          f"beyond the border is the mean, which has to be 128 +- {CLAMPED} for that; train it without "
                           "padding there, with such a mean, or on normalised windows")
     return FloatNetwork(imported.layers, arguments.normalise, mean, scale, name)
 
@@ -49,9 +49,10 @@ def network_of(imported, arguments, name):
 def compared(imported, network, image):
     """A line on how far the float network is from the graph on one image; ValueError if it is another network."""
     runtime, exact = imported.exact(network.input(image[None]).numpy())
-    off = float(np.abs(network.outputs(image[None])[0] - exact).max())
+    got = network.outputs(image[None])[0]
+    off = float(np.abs(got - exact).max())
     if not off <= 1e-3 * (1 + np.abs(exact).max()):
-        raise ValueError(f"the layers read give {network.outputs(image[None])[0]}, {runtime} {exact}: please report this network")
+        raise ValueError(f"the layers read give {got}, {runtime} {exact}: please report this network")
     return f"Float layers against {runtime}, one image: outputs at most {off:.2g} apart."
 
 

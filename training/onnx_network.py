@@ -43,6 +43,10 @@ class Imported:
         return runtime, np.concatenate(values).astype(np.float64)
 
 
+def _times(sizes):
+    return " x ".join(map(str, sizes))
+
+
 def _four(count):
     return (count + 3) // 4 * 4
 
@@ -113,7 +117,11 @@ class _Chain:
             by = self.graph.producer.get(name)
             refuse(node, f"its {what} '{name}' comes from {label(by) if by else 'the image'}, not from the file's constants",
                    _REMEDIES.get(by.op_type if by else "", "export the network with constants folded"))
-        value = np.asarray(self.graph.constants[name], np.float64)
+        try:
+            with np.errstate(invalid="ignore"):
+                value = np.asarray(self.graph.constants[name], np.float64)
+        except (TypeError, ValueError):
+            value = np.array(np.nan)
         if not np.isfinite(value).all():
             refuse(node, f"its {what} '{name}' has values that are no numbers", "train or export the network again")
         return value
@@ -126,7 +134,7 @@ class _Chain:
 
     def _square(self, node, attributes, name, default):
         values = attributes.get(name, default)
-        if len(values) != 2 or values[0] != values[1]:
+        if len(values) != 2 or values[0] != values[1] or values[0] < 1:
             refuse(node, f"{name} is {values}", "train it with two equal ones")
         return values[0]
 
@@ -134,13 +142,15 @@ class _Chain:
         """(rows, columns) on every side."""
         auto, pads = attributes.get("auto_pad", b"NOTSET").decode(), attributes.get("pads", [0, 0, 0, 0])
         if auto.startswith("SAME"):
-            total = [max(0, ((size + stride - 1) // stride - 1) * stride + k - size) for size, k in zip(self.shape[1:], kernel)]
+            total = [max(0, ((size + stride - 1) // stride - 1) * stride + k - size)
+                     for size, k in zip(self.shape[1:], kernel)]
             small, large = [t // 2 for t in total], [t - t // 2 for t in total]
             pads = [*small, *large]
         elif auto == "VALID":
             pads = [0, 0, 0, 0]
-        if pads[:2] != pads[2:]:
-            refuse(node, f"pads are {pads}{f' by auto_pad {auto}' if auto != 'NOTSET' else ''}, not the same on opposite sides",
+        if len(pads) != 4 or pads[:2] != pads[2:] or min(pads) < 0:
+            by = f" by auto_pad {auto}" if auto != "NOTSET" else ""
+            refuse(node, f"pads are {pads}{by}, not the same on opposite sides",
                    "train it with symmetric padding")
         return tuple(pads[:2])
 
@@ -148,13 +158,13 @@ class _Chain:
         """Sizes round down; what the graph itself says has to be the same."""
         sizes = [(size + 2 * p - k) // stride + 1 for size, k, p in zip(self.shape[1:], kernel, pad)]
         if min(sizes) < 1:
-            refuse(node, f"its kernel of {kernel[0]} x {kernel[1]} is larger than its input of {self.shape[1]} x {self.shape[2]}",
+            refuse(node, f"its kernel of {_times(kernel)} is larger than its input of {_times(self.shape[1:])}",
                    "train it for windows of this size")
         self.shape = (channels, *sizes)
         known = self.graph.shapes.get(node.output[0])
         if known is not None and known[1:] != self.shape:
-            refuse(node, f"gives {' x '.join(map(str, known[1:]))}, Berth's layer {' x '.join(map(str, self.shape))} (sizes round "
-                   "down)", "train it with ceil_mode 0")
+            refuse(node, f"gives {_times(known[1:])}, Berth's layer {_times(self.shape)} (sizes round down)",
+                   "train it with ceil_mode 0")
 
     def _closed(self, node):
         """The layer before has had its Relu, or is refused."""
@@ -174,12 +184,14 @@ class _Chain:
         out, each, *kernel = weights.shape
         groups = attributes.get("group", 1)
         self._only(node, attributes, "dilations", [1, 1], "train it without dilation")
+        if min(weights.shape) < 1 or groups < 1 or out % groups:
+            refuse(node, f"weights of the shape {list(weights.shape)}, group {groups}", "export the network again")
         stride = self._square(node, attributes, "strides", [1, 1])
         pad = self._pads(node, attributes, kernel, stride)
         if self.shape[0] != each * groups:
             refuse(node, f"takes {each * groups} channels, gets {self.shape[0]}", "export the network again")
         if groups > 1 and (each % 4 or out // groups % 4):
-            refuse(node, f"group is {groups}: {each} input and {out // groups} output channels a group, must be multiples of 4",
+            refuse(node, f"group is {groups}: {each} input and {out // groups} output channels a group, not multiples of 4",
                    "train it with fewer groups (depthwise convolutions are not possible)")
         if not self.layers:
             try:
@@ -187,6 +199,8 @@ class _Chain:
             except DoesNotFit as error:
                 refuse(node, f"strides are [{stride}, {stride}]: {error}", "train it with such strides in its first Conv")
         bias = self._constant(node, 2, "bias", np.zeros(out))
+        if bias.shape != (out,):
+            refuse(node, f"a bias of the shape {list(bias.shape)} for {out} channels", "export the network again")
         self._weighted(node, weights, bias, stride=stride, pad=pad, groups=groups)
         self._resized(node, out, kernel, stride, pad)
 
@@ -195,7 +209,8 @@ class _Chain:
         self._closed(node)
         channels, rows, columns = self.shape
         if weights.shape[1] != channels * rows * columns:
-            refuse(node, f"takes {weights.shape[1]} numbers, gets {channels * rows * columns}", "flatten the whole map before it")
+            refuse(node, f"takes {weights.shape[1]} numbers, gets {channels * rows * columns}",
+                   "flatten the whole map before it")
         if not self.layers:
             refuse(node, "comes before any Conv", "the first layer has to be a Conv with a stride of 4 or 8")
         self._weighted(node, weights.reshape(-1, channels, rows, columns), bias, connected=True)
@@ -206,6 +221,8 @@ class _Chain:
         weights = self._constant(node, 1, "weights") * attributes.get("alpha", 1.0)
         weights = weights if attributes.get("transB", 0) else weights.T
         bias = self._constant(node, 2, "bias", np.zeros(1)) * attributes.get("beta", 1.0)
+        if weights.ndim != 2 or bias.size not in (1, len(weights)):
+            refuse(node, f"weights of the shape {list(weights.shape)}, bias {list(bias.shape)}", "export the network again")
         self._connected(node, weights, np.broadcast_to(bias.reshape(-1), len(weights)).copy())
 
     def _MatMul(self, node, attributes):
@@ -219,11 +236,12 @@ class _Chain:
         index = 0 if node.input[0] in self.graph.constants else 1
         value = self._constant(node, index, "constant")
         if not self.open or self.open.pools:
-            refuse(node, "adds a constant where there is no Conv, Gemm or MatMul directly before it", "train it with its bias there "
+            refuse(node, "adds a constant where there is no Conv, Gemm or MatMul directly before it",
+                   "train it with its bias there "
                    "(what is added to the image is --mean)")
-        known = self.graph.shapes.get(node.output[0], self.shape)
+        shape = self.shape if len(self.graph.shapes.get(node.output[0], self.shape)) == 4 else self.shape[:1]
         try:
-            value = np.broadcast_to(value, (1, *(self.shape if len(known) == 4 else self.shape[:1]))).reshape(self.shape[0], -1)
+            value = np.broadcast_to(value, (1, *shape)).reshape(shape[0], -1)
         except ValueError:
             refuse(node, f"its constant has the shape {list(value.shape)}", "a bias has one number a channel")
         if (value != value[:, :1]).any():
@@ -233,10 +251,14 @@ class _Chain:
     def _BatchNormalization(self, node, attributes):
         self._only(node, attributes, "training_mode", 0, "export the network for inference")
         if not self.open or self.open.pools:
-            refuse(node, "does not come directly after a Conv or Gemm", "train it with BatchNormalization between Conv and Relu")
+            refuse(node, "does not come directly after a Conv or Gemm",
+                   "train it with BatchNormalization between Conv and Relu")
         scale, offset, mean, variance = (self._constant(node, 1 + i, what) for i, what in
                                          enumerate(("scale", "B", "mean", "variance")))
-        factor = scale / np.sqrt(variance + attributes.get("epsilon", 1e-5))
+        epsilon, channels = attributes.get("epsilon", 1e-5), self.shape[0]
+        if {scale.shape, offset.shape, mean.shape, variance.shape} != {(channels,)} or (variance + epsilon <= 0).any():
+            refuse(node, "not one scale, B, mean and variance above 0 a channel", "export the network again")
+        factor = scale / np.sqrt(variance + epsilon)
         self.open.weights = self.open.weights * factor[:, None, None, None]
         self.open.bias = (self.open.bias - mean) * factor + offset
 
@@ -296,8 +318,9 @@ class _Chain:
         if rows == columns == 1:
             allowed += [(channels, 1), *([()] if channels == 1 else [])]
         if known is None or known[:1] != (self.graph.batch,) or known[1:] not in allowed:
-            refuse(node, f"gives {'a shape that is not known' if known is None else ' x '.join(map(str, known))} from "
-                   f"{self.graph.batch} x {' x '.join(map(str, self.shape))}", "only Flatten to one vector an image is read")
+            gives = "a shape that is not known" if known is None else _times(known)
+            refuse(node, f"gives {gives} from {_times((self.graph.batch, *self.shape))}",
+                   "only Flatten to one vector an image is read")
 
     _Flatten = _Squeeze = _Unsqueeze = _Reshape
 
@@ -305,13 +328,14 @@ class _Chain:
 
     def _end(self, node, count, remedy):
         if not self.open or self.shape != (count, 1, 1):
-            refuse(node, f"of {' x '.join(map(str, self.shape))} numbers, not of {count} from a last layer without Relu", remedy)
+            refuse(node, f"of {_times(self.shape)} numbers, not of {count} from a last layer without Relu",
+                   remedy)
         self.end = node
 
     def _Softmax(self, node, attributes):
         axis = attributes.get("axis", 1 if self.graph.opset < 13 else -1)
         rank = len(self.graph.shapes.get(node.output[0], (0, 0)))
-        if axis % rank != 1:
+        if axis not in (1, 1 - rank):
             refuse(node, f"axis is {axis}", "it must be over the two classes")
         self._end(node, 2, "train it with two classes, absent and present")
         self.notes.append(f"{label(node)} is dropped: Berth's score is the softmax of the two numbers before it")
@@ -326,10 +350,12 @@ class _Chain:
         """(weights [1, 2, 3 or 5, channels], bias) of the last layer, which has no Relu."""
         last = self.open
         if last is None:
-            raise Unsupported(f"output '{output}' comes from a Relu or pooling; the last layer has to be a Gemm without Relu")
+            raise Unsupported(f"output '{output}' comes from a Relu or pooling; the last layer has to be a Gemm without "
+                              "Relu")
         if last.pools or last.of_map[1:] != (1, 1) or last.weights.shape[2:] != (1, 1) or last.groups > 1:
             what = "is pooled" if last.pools else f"takes a map of {last.of_map[1]} x {last.of_map[2]}"
-            refuse(last.node, f"is the last layer and {what}", "Berth's last layer takes a vector: put a Gemm with Relu before it")
+            refuse(last.node, f"is the last layer and {what}",
+                   "Berth's last layer takes a vector: put a Gemm with Relu before it")
         return _padded(last.weights[:, :, 0, 0], 1), last.bias
 
 
@@ -340,8 +366,8 @@ def _joined(chains, outputs):
     counts = [len(heads[i][1]) for i in order]
     if counts not in ([1], [2], [5], [1, 3], [2, 3]):
         named = ", ".join(f"'{outputs[i]}' of {len(heads[i][1])}" for i in range(len(chains)))
-        raise Unsupported(f"outputs {named} numbers; Berth takes two scores (absent, present) or one, and three numbers of centre "
-                          "and size beside them or as a second output: train or export it with these")
+        raise Unsupported(f"outputs {named} numbers; Berth takes two scores (absent, present) or one, and three numbers of "
+                          "centre and size beside them or as a second output: train or export it with these")
     if chains[order[-1]].end is not None and counts[-1] == 3:
         refuse(chains[order[-1]].end, "of centre and size", "these have to be plain numbers")
     weights, bias = ([heads[i][part] for i in order] for part in (0, 1))
@@ -360,8 +386,8 @@ def read(path):
     graph = Graph(path)
     outputs = [info.name for info in graph.model.graph.output]
     if not 1 <= len(outputs) <= 2:
-        raise Unsupported(f"{len(outputs)} outputs ({', '.join(outputs)}); Berth takes the scores, and centre and size: export it "
-                          "with these alone")
+        raise Unsupported(f"{len(outputs)} outputs ({', '.join(outputs)}); Berth takes the scores, and centre and size: export "
+                          "it with these alone")
     paths = [graph.path_to(output) for output in outputs]
     common = 0
     while all(common < len(p) and p[common] is paths[0][common] for p in paths):
@@ -374,7 +400,8 @@ def read(path):
         for node in nodes[common:]:
             chain.take(node)
             if len(trunk.layers) > depth:
-                refuse(node, "belongs to one of two outputs alone", "only their last Gemm may be their own: train it with all other "
+                refuse(node, "belongs to one of two outputs alone",
+                       "only their last Gemm may be their own: train it with all other "
                        "layers in common")
     name, weights, bias, ordered = _joined(chains, outputs)
     name = trunk.unique(name)

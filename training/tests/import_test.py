@@ -11,7 +11,7 @@ from unittest import mock
 import numpy as np
 import onnx
 import torch
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto, helper
 from PIL import Image
 from torch import nn
 
@@ -25,83 +25,11 @@ import quantisation  # noqa: E402
 import slow_network as slow  # noqa: E402
 from float_network import FloatNetwork  # noqa: E402
 from integer_network import IntegerNetwork  # noqa: E402
+from onnx_export import Export, lively, trunk  # noqa: E402
 from onnx_graph import Unsupported  # noqa: E402
 from tiny_network import window  # noqa: E402
 
 torch.set_num_threads(1)
-
-
-class Export:
-    """An ONNX graph from torch modules, one node after the other."""
-
-    def __init__(self, shape=("n", 1, 256, 256), kind=TensorProto.FLOAT):
-        self.input = helper.make_tensor_value_info("image", kind, shape)
-        self.nodes, self.constants, self.outputs = [], [], []
-
-    def constant(self, value):
-        name = f"w{len(self.constants)}"
-        value = value.detach().numpy() if isinstance(value, torch.Tensor) else np.asarray(value)
-        self.constants.append(numpy_helper.from_array(value, name))
-        return name
-
-    def node(self, op, inputs, **attributes):
-        name = f"{op.lower()}_{len(self.nodes)}"
-        self.nodes.append(helper.make_node(op, inputs, [name + "_out"], name, **attributes))
-        return name + "_out"
-
-    def module(self, m, x):
-        if isinstance(m, nn.Conv2d):
-            return self.node("Conv", [x, self.constant(m.weight), self.constant(m.bias)], kernel_shape=list(m.kernel_size),
-                             strides=list(m.stride), pads=[*m.padding, *m.padding], group=m.groups)
-        if isinstance(m, (nn.BatchNorm2d, nn.BatchNorm1d)):
-            return self.node("BatchNormalization", [x, *map(self.constant, (m.weight, m.bias, m.running_mean, m.running_var))],
-                             epsilon=m.eps)
-        if isinstance(m, nn.LocalResponseNorm):
-            return self.node("LRN", [x], size=m.size, alpha=m.alpha, beta=m.beta, bias=float(m.k))
-        if isinstance(m, nn.MaxPool2d):
-            return self.node("MaxPool", [x], kernel_shape=[m.kernel_size] * 2, strides=[m.stride] * 2)
-        if isinstance(m, nn.Linear):
-            return self.node("Gemm", [x, self.constant(m.weight), self.constant(m.bias)], transB=1)
-        if isinstance(m, nn.Softmax):
-            return self.node("Softmax", [x], axis=1)
-        return self.node({nn.ReLU: "Relu", nn.Flatten: "Flatten", nn.Sigmoid: "Sigmoid", nn.Dropout: "Dropout",
-                          nn.Identity: "Identity"}[type(m)], [x])
-
-    def sequence(self, modules, x="image"):
-        for module in modules:
-            x = self.module(module, x)
-        return x
-
-    def output(self, x, kind=TensorProto.FLOAT, rank=2):
-        self.outputs.append(helper.make_tensor_value_info(x, kind, [f"{x}_{i}" for i in range(rank)]))
-        return self
-
-    def proto(self, opset=17):
-        graph = helper.make_graph(self.nodes, "net", [self.input], self.outputs, self.constants)
-        return helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=8)
-
-
-def lively(modules):
-    """Weights as before training, batch norms that do something."""
-    torch.manual_seed(5)
-    for m in modules:
-        if isinstance(m, (nn.Conv2d, nn.Linear)):
-            nn.init.kaiming_normal_(m.weight, nonlinearity="relu")
-            m.bias.data.uniform_(-0.2, 0.2)
-        if isinstance(m, (nn.BatchNorm2d, nn.BatchNorm1d)):
-            m.running_mean.uniform_(-0.2, 0.2)
-            m.running_var.uniform_(1, 4)
-            m.weight.data.uniform_(0.3, 2)
-            m.bias.data.uniform_(-0.3, 0.3)
-    return nn.Sequential(*modules).eval()
-
-
-def trunk(first=None):
-    """Every kind of layer; 10 and 18 channels are no multiples of four."""
-    return [first or nn.Conv2d(1, 8, 8, 4), nn.BatchNorm2d(8), nn.ReLU(), nn.LocalResponseNorm(5, 0.02, 0.6, 1.5),
-            nn.MaxPool2d(3, 2), nn.Identity(), nn.Conv2d(8, 16, 5, 3, 2, groups=2), nn.ReLU(), nn.MaxPool2d(2, 2),
-            nn.Conv2d(16, 10, 3, 1, 1), nn.MaxPool2d(2, 2), nn.Dropout(0.5), nn.ReLU(),
-            nn.LocalResponseNorm(5, 1e-4, 0.75, 1.0), nn.Flatten(), nn.Linear(40, 18), nn.BatchNorm1d(18), nn.ReLU(), nn.Dropout(0.4)]
 
 
 IMAGES = np.stack([window(seed) for seed in range(8)])
@@ -194,7 +122,8 @@ class Imports(Case):
         parts = Export()  # geometry named first
         x = parts.sequence(rest)
         for rows in (slice(2, 5), slice(0, 2)):
-            parts.output(parts.node("Gemm", [x, parts.constant(last.weight[rows].T.contiguous()), parts.constant(last.bias[rows])]))
+            parts.output(parts.node("Gemm",
+                                    [x, parts.constant(last.weight[rows].T.contiguous()), parts.constant(last.bias[rows])]))
         wanted, _, q = self.check(layers, parts.proto())
         self.assertNotEqual(q.model.outputs[1], (0, 1))
 
@@ -218,7 +147,8 @@ class Imports(Case):
         x = e.node("Add", [e.constant(conv.bias[:, None, None]), x])
         x = e.node("Relu", [e.module(layers[1], x)])
         count = e.node("Gather", [e.node("Shape", [x]), e.constant(np.array(0))])
-        shape = e.node("Concat", [e.node("Unsqueeze", [count, e.constant(np.array([0]))]), e.constant(np.array([-1]))], axis=0)
+        shape = e.node("Concat", [e.node("Unsqueeze", [count, e.constant(np.array([0]))]), e.constant(np.array([-1]))],
+                       axis=0)
         x = e.node("Reshape", [x, shape])
         weights = e.node("Transpose", [e.node("Identity", [e.constant(fc.weight)])], perm=[1, 0])
         x = e.node("Relu", [e.node("Add", [e.node("MatMul", [x, weights]), e.constant(fc.bias)])])
@@ -227,9 +157,32 @@ class Imports(Case):
         self.check(layers, proto)
         imported = self.read(proto)
         runtime, exact = imported.exact(self.network(proto).input(IMAGES[:1]).numpy())
-        np.testing.assert_allclose(exact, layers(self.network(proto).input(IMAGES[:1])).detach().numpy()[0], rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(exact, layers(self.network(proto).input(IMAGES[:1])).detach().numpy()[0], rtol=1e-4,
+                                   atol=1e-4)
         with mock.patch("importlib.util.find_spec", return_value=None):
             self.assertEqual(imported.exact(np.zeros((1, 1, 256, 256), np.float32))[0], "ONNX's reference")
+
+    def test_response_norm_as_pytorch_writes_it(self):
+        """The nodes of torch.onnx.export for nn.LocalResponseNorm; with another pooling they are none."""
+        norm = nn.LocalResponseNorm(5, 0.3, 0.6, 1.5)
+        layers = lively([nn.Conv2d(1, 8, 8, 8), nn.ReLU(), norm, nn.MaxPool2d(6, 6), nn.Flatten(), nn.Linear(200, 12),
+                         nn.ReLU(),
+                         nn.Linear(12, 2)])
+
+        def exported(pads=(2, 2), second=None, divided=None):
+            e = Export()
+            x = e.sequence(layers[:2])
+            y = e.node("Reshape", [e.node("Mul", [x, second or x]), e.constant(np.array([0, 1, 8, 32, -1]))])
+            y = e.node("Pad", [y, e.constant(np.array([0, 0, pads[0], 0, 0, 0, 0, pads[1], 0, 0]))])
+            y = e.node("AveragePool", [y], kernel_shape=[5, 1, 1], strides=[1, 1, 1], count_include_pad=1)
+            y = e.node("Squeeze", [y, e.constant(np.array([1]))])
+            for op, value in (("Mul", norm.alpha), ("Add", norm.k), ("Pow", norm.beta)):
+                y = e.node(op, [y, e.constant(np.float32(value))])
+            return e.output(e.sequence(layers[3:], e.node("Div", [divided or x, y]))).proto()
+
+        self.check(layers, exported())
+        for changes in ({"pads": (4, 0)}, {"second": "conv_0_out"}, {"divided": "conv_0_out"}):
+            self.refused(exported(**changes), "Div 'div_10'", "joins 2 tensors", "dynamo=True")
 
     def test_batches_of_a_fixed_size_are_taken_apart(self):
         layers = lively([*trunk(), nn.Linear(18, 2)])
@@ -262,7 +215,8 @@ class Refusals(Case):
         for change, *words in (({"dilations": [2, 2]}, "dilations is [2, 2]", "without dilation"),
                                ({"strides": [2, 2]}, "strides are [2, 2]", "first layer", "must be 4, 8"),
                                ({"strides": [4, 8]}, "strides is [4, 8]"), ({"pads": [0, 0, 1, 1]}, "pads are [0, 0, 1, 1]"),
-                               ({"auto_pad": "SAME_UPPER", "kernel_shape": [8, 8], "strides": [5, 5]}, "pads", "SAME_UPPER")):
+                               ({"auto_pad": "SAME_UPPER", "kernel_shape": [8, 8], "strides": [5, 5]}, "pads",
+                                "SAME_UPPER")):
             with self.subTest(change):
                 self.refused(self.made(self.CONV, nn.ReLU(), conv_0=change), "Conv 'conv_0'", *words)
         depthwise = nn.Conv2d(8, 8, 3, groups=8)
@@ -273,10 +227,12 @@ class Refusals(Case):
     def test_norms_and_pooling(self):
         head = [self.CONV, nn.ReLU()]
         self.refused(self.made(*head, nn.LocalResponseNorm(3)), "LRN 'lrn_2'", "size is 3")
-        self.refused(self.made(*head, nn.BatchNorm2d(8)), "BatchNormalization 'batchnormalization_2'", "between Conv and Relu")
+        self.refused(self.made(*head, nn.BatchNorm2d(8)), "BatchNormalization 'batchnormalization_2'",
+                     "between Conv and Relu")
         pool = nn.MaxPool2d(2, 2)
         for change, *words in (({"pads": [1, 1, 1, 1]}, "pads are [1, 1]"), ({"ceil_mode": 1}, "32 x 32", "ceil_mode 0"),
-                               ({"kernel_shape": [2, 3]}, "kernel_shape is [2, 3]"), ({"strides": [1, 2]}, "strides is [1, 2]"),
+                               ({"kernel_shape": [2, 3]}, "kernel_shape is [2, 3]"),
+                               ({"strides": [1, 2]}, "strides is [1, 2]"),
                                ({"kernel_shape": [99, 99]}, "larger than its input of 63 x 63")):
             with self.subTest(change):
                 self.refused(self.made(*head, pool, maxpool_2=change), "MaxPool 'maxpool_2'", *words)
@@ -286,10 +242,12 @@ class Refusals(Case):
         for op, remedy in (("GlobalAveragePool", "flatten"), ("LeakyRelu", "Relu"), ("Tanh", "without it")):
             export = Export()
             x = export.sequence([self.CONV])
-            self.refused(export.output(export.node(op, [x]), rank=4).proto(), f"{op} '{op.lower()}_1'", "no such layer", remedy)
+            self.refused(export.output(export.node(op, [x]), rank=4).proto(), f"{op} '{op.lower()}_1'", "no such layer",
+                         remedy)
         export = Export()
         scaled = export.node("Div", ["image", export.constant(np.float32(255))])
-        self.refused(export.output(export.sequence([self.CONV], scaled), rank=4).proto(), "Div 'div_0'", "--mean and --scale")
+        self.refused(export.output(export.sequence([self.CONV], scaled), rank=4).proto(), "Div 'div_0'",
+                     "--mean and --scale")
         export = Export()
         export.nodes.append(helper.make_node("Swirl", ["image"], ["y"], domain="org.example"))
         proto = export.output("y", rank=4).proto()
@@ -300,11 +258,14 @@ class Refusals(Case):
         export = Export()
         x = export.sequence([self.CONV, nn.ReLU()])
         y = export.sequence([nn.Conv2d(8, 8, 3, 1, 1), nn.ReLU()], x)
-        self.refused(export.output(export.node("Add", [x, y]), rank=4).proto(), "Add 'add_4'", "joins 2 tensors", "without branches")
+        self.refused(export.output(export.node("Add", [x, y]), rank=4).proto(), "Add 'add_4'", "joins 2 tensors",
+                     "without branches")
         export = Export()
-        weights = export.node("DequantizeLinear", [export.constant(np.ones((8, 1, 8, 8), np.int8)), export.constant(np.float32(1))])
+        weights = export.node("DequantizeLinear",
+                              [export.constant(np.ones((8, 1, 8, 8), np.int8)), export.constant(np.float32(1))])
         x = export.node("Conv", ["image", weights], strides=[4, 4])
-        self.refused(export.output(x, rank=4).proto(), "Conv 'conv_1'", "DequantizeLinear 'dequantizelinear_0'", "give the float network")
+        self.refused(export.output(x, rank=4).proto(), "Conv 'conv_1'", "DequantizeLinear 'dequantizelinear_0'",
+                     "give the float network")
 
     def test_heads(self):
         front = [self.CONV, nn.ReLU(), nn.MaxPool2d(63, 1)]
@@ -315,7 +276,8 @@ class Refusals(Case):
         self.refused(self.made(self.CONV, nn.ReLU(), nn.Flatten(), nn.Linear(8 * 63 * 63, 2)), "Gemm 'gemm_3'",
                      "takes a map of 63 x 63", "with Relu before it")
         self.refused(self.made(nn.Flatten(), nn.Linear(65536, 2)), "Gemm 'gemm_1'", "before any Conv")
-        self.refused(self.made(*front, nn.Flatten(), nn.Linear(8, 2), nn.Softmax(1), nn.ReLU()), "Relu 'relu_6'", "comes after")
+        self.refused(self.made(*front, nn.Flatten(), nn.Linear(8, 2), nn.Softmax(1), nn.ReLU()), "Relu 'relu_6'",
+                     "comes after")
         export = Export()
         x = export.sequence([*front, nn.Flatten()])
         branch = export.sequence([nn.Linear(8, 8), nn.ReLU(), nn.Linear(8, 3)], x)
@@ -323,7 +285,8 @@ class Refusals(Case):
         self.refused(export.proto(), "Relu 'relu_5'", "one of two outputs alone")
 
     def test_inputs(self):
-        for shape, words in ((("n", 3, 256, 256), "1 x 3 x 256 x 256"), (("n", 1, 224, 224), "224 x 224"), ((1, 65536), "1 x 65536")):
+        for shape, words in ((("n", 3, 256, 256), "1 x 3 x 256 x 256"), (("n", 1, 224, 224), "224 x 224"),
+                             ((1, 65536), "1 x 65536")):
             export = Export(shape)
             proto = export.output(export.node("Identity", ["image"]), rank=len(shape)).proto()
             self.refused(proto, "'image'", words, "256 x 256")
@@ -369,7 +332,8 @@ class Files(unittest.TestCase):
         return out.getvalue()
 
     def bring(self, net, *more, into="out.berthnet", pictures="pictures"):
-        return self.called(self.folder / net, "--calibrate", self.folder / pictures, "-o", self.folder / into, "--threads", 1, *more)
+        return self.called(self.folder / net, "--calibrate", self.folder / pictures, "-o", self.folder / into, "--threads",
+                           1, *more)
 
     def test_a_network_comes_in_with_its_figures(self):
         said = self.bring("net.onnx", "--mean", "127.5", "--scale", "1/64", "--name", "other")
@@ -392,7 +356,8 @@ class Files(unittest.TestCase):
         layers = lively([*trunk(nn.Conv2d(1, 8, 11, 4, 2)), nn.Linear(18, 2)])
         export = Export()
         onnx.save(export.output(export.sequence(layers)).proto(), self.folder / "padded.onnx")
-        self.assertIn("conv_0: pads are [2, 2] in the first layer", self.bring("padded.onnx", "--mean", 0, "--scale", "1/255"))
+        self.assertIn("conv_0: pads are [2, 2] in the first layer",
+                      self.bring("padded.onnx", "--mean", 0, "--scale", "1/255"))
 
     def test_damaged_files_are_said_to_be(self):
         whole = (self.folder / "net.onnx").read_bytes()

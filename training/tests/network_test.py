@@ -1,5 +1,6 @@
 """Tests of the integer network and its file; needs torch. Run: python3 -m unittest discover -s training/tests -p
 '*_test.py'"""
+import dataclasses
 import pathlib
 import struct
 import sys
@@ -190,6 +191,17 @@ class Files(unittest.TestCase):
         body = bytearray(self.data[16:-4])
         struct.pack_into("<i", body, at, value)
         return self.sealed(bytes(body))
+
+    def test_what_berths_reader_refuses_is_not_written(self):
+        wide = self.model.layers[:1] + [MaxPool(1, 65)] + self.model.layers[1:]
+        with self.assertRaisesRegex(ModelError, "layer 2 .*stride of 65, at most 64"):
+            model_file.shapes(dataclasses.replace(self.model, layers=wide))
+        many = self.model.layers[:2] + 62 * self.model.layers[1:2] + self.model.layers[2:]
+        with self.assertRaisesRegex(ModelError, "at most 64"):
+            model_file.shapes(dataclasses.replace(self.model, layers=many))
+        huge = Convolve(np.zeros((1028, 4, 1, 1), np.int8), np.zeros(1028, np.int32), np.zeros(1028, np.int32), 0)
+        with self.assertRaisesRegex(ModelError, r"layer 1 .*256 x 64 x 1028 activations"):
+            model_file.shapes(dataclasses.replace(self.model, layers=[huge, *self.model.layers[-1:]]))
 
     def test_come_back_as_they_were_written(self):
         with tempfile.TemporaryDirectory() as folder:
