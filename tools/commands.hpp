@@ -14,6 +14,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code);
 void add_verify(CLI::App& app, Console& console, int& exit_code);
 void add_bench(CLI::App& app, Console& console, int& exit_code);
 void add_eval(CLI::App& app, Console& console, int& exit_code);
+void add_model(CLI::App& app, Console& console, int& exit_code);
 void add_doctor(CLI::App& app, Console& console, int& exit_code);
 
 }  // namespace berth::cli

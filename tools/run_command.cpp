@@ -18,9 +18,20 @@ constexpr const char* kExamples = R"(Examples:
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
   berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
+  berth model show lite.berthnet                 its layers, with their sizes and costs
   berth doctor                                   what this machine has, and what it lacks
 
 Exit codes: 0 all well; 1 verify or eval found a difference, or a demo found nothing; 2 bad input or usage.)";
+
+/// "a, b or c": the commands below one; empty where there are none.
+std::string choices_of(const CLI::App& command) {
+  std::string text;
+  const std::vector<const CLI::App*> choices = command.get_subcommands(nullptr);
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 < choices.size() ? ", " : " or ") + choices[i]->get_name();
+  }
+  return text;
+}
 
 }  // namespace
 
@@ -40,6 +51,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_verify(app, console, exit_code);
   add_bench(app, console, exit_code);
   add_eval(app, console, exit_code);
+  add_model(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.
   if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);
@@ -47,10 +59,14 @@ int run_command(int argc, const char* const* argv, Console& console) {
     app.parse(argc, argv);
   } catch (const CLI::RequiredError& error) {
     // CLI11 tells a mistyped command only as the lack of one.
-    const std::string given = argc > 1 ? argv[1] : "";
-    if (app.get_subcommands().empty() && !given.empty() && given[0] != '-') {
-      console.complain("command line: field 'command' is '" + given +
-                       "'; use demo, detect, run, verify, bench, eval or doctor");
+    const CLI::App* command = &app;
+    int word = 1;
+    for (; !command->get_subcommands().empty(); ++word) command = command->get_subcommands().front();
+    const std::string given = argc > word ? argv[word] : "";
+    const std::string choices = choices_of(*command);
+    if (!choices.empty() && !given.empty() && given[0] != '-') {
+      console.complain("command line: field '" + (word == 1 ? "command" : command->get_name()) + "' is '" + given +
+                       "'; use " + choices);
     } else {
       app.exit(error, console.out(), console.err());
     }

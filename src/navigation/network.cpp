@@ -9,16 +9,6 @@
 namespace berth {
 namespace {
 
-const char* name_of(const Layer& layer) {
-  struct Name {
-    const char* operator()(const ConvolveLayer&) const { return "convolve"; }
-    const char* operator()(const LocalResponseNormLayer&) const { return "local_response_norm"; }
-    const char* operator()(const MaxPoolLayer&) const { return "max_pool"; }
-    const char* operator()(const FullyConnectedLayer&) const { return "fully_connected"; }
-  };
-  return std::visit(Name(), layer);
-}
-
 std::string text_of(const Shape& shape) {
   return std::to_string(shape.height) + "x" + std::to_string(shape.width) + "x" + std::to_string(shape.channels);
 }
@@ -117,6 +107,16 @@ class Check {
 };
 
 }  // namespace
+
+const char* name_of(const Layer& layer) {
+  struct Name {
+    const char* operator()(const ConvolveLayer&) const { return "convolve"; }
+    const char* operator()(const LocalResponseNormLayer&) const { return "local_response_norm"; }
+    const char* operator()(const MaxPoolLayer&) const { return "max_pool"; }
+    const char* operator()(const FullyConnectedLayer&) const { return "fully_connected"; }
+  };
+  return std::visit(Name(), layer);
+}
 
 s32 FixedScale::apply(std::int64_t value) const {
   constexpr std::int64_t kMost = 1 << 30;

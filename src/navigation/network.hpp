@@ -58,6 +58,8 @@ struct FullyConnectedLayer {
 };
 
 using Layer = std::variant<ConvolveLayer, LocalResponseNormLayer, MaxPoolLayer, FullyConnectedLayer>;
+/// Its kind as docs/network-arithmetic.md spells it: "convolve", …
+const char* name_of(const Layer& layer);
 
 /// The last layer: two scores, then the geometry's three numbers or none. Weights are s8[out][in].
 struct Heads {
