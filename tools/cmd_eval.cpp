@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include "berth/error.hpp"
@@ -11,6 +13,8 @@
 #include "eval_tables.hpp"
 #include "frame/digest.hpp"
 #include "navigation/window_scorer.hpp"
+#include "orb_matcher.hpp"
+#include "roc_svg.hpp"
 
 namespace berth::cli {
 namespace {
@@ -19,6 +23,7 @@ constexpr const char* kExamples = R"(Examples:
   berth eval lite.berthnet sets/disjoint                          accuracy, misses and false positives, by threshold
   berth eval lite.berthnet sets/disjoint --backend simd,vulkan    both must give the same bits
   berth eval lite.berthnet sets/disjoint --limit 500 --threads 2
+  berth eval lite.berthnet sets/disjoint --orb --plots plots      ORB on the same images; curves as SVG
 
 A set is what berth_navset makes (training/README.md).)";
 
@@ -31,7 +36,12 @@ struct EvalCommand {
   double threshold = 0.5;
   int limit = 0;
   int batch = 8;
+  bool orb = false;
+  std::string plots;
 };
+
+/// Of a share; as the tables have it.
+int q15(double threshold) { return static_cast<int>(threshold * 32768); }
 
 struct Run {
   std::string backend;
@@ -39,6 +49,12 @@ struct Run {
   std::vector<WindowScore> scores;
   double seconds = 0;
 };
+
+void show_progress(Console& console, const std::string& name, std::size_t done, std::size_t count) {
+  if (!console.out_is_terminal()) return;
+  console.out() << (done < count ? fmt::format("\r{:<10} {} of {} images\x1b[K", name, done, count) : "\r\x1b[K")
+                << std::flush;
+}
 
 Run run_on(const std::string& name, const EvalCommand& command, const Network& network, const LabelledSet& set,
            std::size_t count, Console& console) {
@@ -54,11 +70,8 @@ Run run_on(const std::string& name, const EvalCommand& command, const Network& n
     std::vector<WindowScore> scores = scorer.score(pixels.data(), static_cast<int>(here));
     run.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     std::move(scores.begin(), scores.end(), std::back_inserter(run.scores));
-    if (console.out_is_terminal()) {
-      console.out() << fmt::format("\r{:<10} {} of {} images\x1b[K", name, first + here, count) << std::flush;
-    }
+    show_progress(console, name, first + here, count);
   }
-  if (console.out_is_terminal()) console.out() << "\r\x1b[K";
   return run;
 }
 
@@ -80,11 +93,65 @@ std::size_t first_difference(const Run& a, const Run& b) {
   return i;
 }
 
+/// ORB's decisions, by matches alone and by those that a homography agrees with.
+std::vector<Rival> run_orb(const EvalCommand& command, const Network& network, const LabelledSet& set,
+                           std::size_t count, Console& console) {
+  const OrbMatcher matcher(command.set, network.side);
+  std::vector<Rival> rivals = {{"ORB", {}}, {"ORB, homography", {}}};
+  std::vector<u8> pixels(static_cast<std::size_t>(network.side) * static_cast<std::size_t>(network.side));
+  const auto start = std::chrono::steady_clock::now();
+  for (std::size_t k = 0; k < count; ++k) {
+    const LabelledImage& image = set.images()[k];
+    set.read(image, pixels.data());
+    const OrbEvidences evidences = matcher.match(pixels.data());
+    for (std::size_t i = 0; i < evidences.size(); ++i) {
+      rivals[0].decisions[i].count(image.present, evidences[i].matches >= OrbMatcher::kLeast);
+      rivals[1].decisions[i].count(image.present, evidences[i].inliers >= OrbMatcher::kLeast);
+    }
+    show_progress(console, "ORB", k + 1, count);
+  }
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  console.out() << fmt::format(
+      "\nORB: {} features, {} views of the training part, at least {} good matches or inliers; {:.1f} images/s\n",
+      OrbMatcher::kFeatures, matcher.templates(), OrbMatcher::kLeast, static_cast<double>(count) / spent.count());
+  return rivals;
+}
+
+void write_plots(const EvalCommand& command, const std::string& network, const std::vector<Judged>& judged,
+                 const std::vector<Rival>& rivals, Console& console) {
+  RocPlot plot{network, curve_of(judged), q15(command.threshold), {}};
+  for (const Rival& rival : rivals) {
+    MarkedSeries series{rival.name, {}};
+    for (std::size_t i = 0; i < kTableThresholds.size(); ++i) {
+      series.marks.push_back({fmt::format("{:.2f}", kTableThresholds[i] / 100.0), rival.decisions[i]});
+    }
+    plot.others.push_back(series);
+  }
+  console.out() << '\n';
+  for (const auto& [name, drawing] :
+       {std::pair("roc.svg", roc_svg(plot)), std::pair("precision-recall.svg", precision_recall_svg(plot))}) {
+    const std::string path = (std::filesystem::path(command.plots) / name).string();
+    std::ofstream file(path, std::ios::binary);
+    file << drawing;
+    file.close();
+    if (!file) throw Error(path + ": the drawing cannot be written; check the folder, its permissions and space");
+    console.out() << "written: " << path << '\n';
+  }
+}
+
+/// Before minutes of work, not after.
+void make_folder(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) throw Error(path + ": the folder cannot be made (" + error.message() + "); choose another for --plots");
+}
+
 int run_eval(const EvalCommand& command, Console& console) {
   const Network network = read_network(command.network);
   const LabelledSet set(command.set, command.part, network.side);
   const std::size_t count =
       command.limit > 0 ? std::min(set.images().size(), static_cast<std::size_t>(command.limit)) : set.images().size();
+  if (!command.plots.empty()) make_folder(command.plots);
   const std::vector<std::string> names = command.backends.empty() ? std::vector<std::string>{"simd"} : command.backends;
   std::vector<Run> runs;
   for (const std::string& name : names) runs.push_back(run_on(name, command, network, set, count, console));
@@ -107,14 +174,19 @@ int run_eval(const EvalCommand& command, Console& console) {
 
   std::vector<Judged> judged;
   for (std::size_t i = 0; i < count; ++i) judged.push_back({set.images()[i], runs[0].scores[i].output});
-  const int threshold = static_cast<int>(command.threshold * 32768);
+  const int threshold = q15(command.threshold);
   const Decisions decisions = decide(judged, threshold);
   console.out() << fmt::format("\nat {:.2f}: accuracy {:.3f} %, {} errors of {}: {} of {} missed, {} of {} false\n",
-                               command.threshold, 100.0 * (decisions.all() - decisions.wrong()) / decisions.all(),
-                               decisions.wrong(), decisions.all(), decisions.missed, decisions.present(),
-                               decisions.false_found, decisions.absent())
+                               command.threshold, 100 * decisions.accuracy(), decisions.wrong(), decisions.all(),
+                               decisions.missed, decisions.present(), decisions.false_found, decisions.absent())
                 << threshold_table(judged) << confusion_tables(judged, threshold);
-  if (network.heads.geometry > 0) console.out() << geometry_table(judged, threshold);
+  if (network.heads.geometry > 0) console.out() << geometry_table(judged, threshold) << range_table(judged, threshold);
+  std::vector<Rival> rivals;
+  if (command.orb) {
+    rivals = run_orb(command, network, set, count, console);
+    console.out() << rates_table(judged, rivals);
+  }
+  if (!command.plots.empty()) write_plots(command, network.name, judged, rivals, console);
   return exit_code;
 }
 
@@ -144,6 +216,8 @@ void add_eval(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("N")
       ->capture_default_str();
   command->add_option("--batch", options->batch, "images a launch")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_flag("--orb", options->orb, "an ORB matcher beside the network, with templates of the training part");
+  command->add_option("--plots", options->plots, "draw roc.svg and precision-recall.svg there")->type_name("DIR");
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] { exit_code = run_eval(*options, console); });
 }

@@ -44,6 +44,15 @@ class Row {
     }
     return value;
   }
+  /// A column or row of an image.
+  int pixel(const char* name, int side) const {
+    const double value = number(name);
+    if (!(value >= 0 && value < side)) {
+      throw Error(where_ + ": field '" + name + "' is " + text(name) + ", not within the image's " +
+                  std::to_string(side) + " px; make the set again");
+    }
+    return static_cast<int>(value);
+  }
 
  private:
   const std::map<std::string, std::size_t>& columns_;
@@ -81,8 +90,13 @@ LabelledSet::LabelledSet(const std::string& folder, const std::string& part, int
     image.x = row.number("x");
     image.y = row.number("y");
     image.depth_m = row.number("depth_m");
+    image.box = {row.pixel("x0", side), row.pixel("y0", side), row.pixel("x1", side), row.pixel("y1", side)};
+    if (image.box[2] < image.box[0] || image.box[3] < image.box[1]) {
+      throw Error(labels + ", line " + std::to_string(number) + ": the box ends before it begins; make the set again");
+    }
     image.light = row.text("light");
     image.background = row.text("background");
+    image.livery = row.text("livery");
     images_.push_back(image);
   }
   if (images_.empty()) throw Error(labels + ": has no image of the part '" + part + "'; the parts are train and test");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,10 @@ struct LabelledImage {
   double x = 0;
   double y = 0;
   double depth_m = 0;
+  std::array<int, 4> box{};  // of what is visible: left, top, right, bottom, the last ones included
   std::string light;
   std::string background;
+  std::string livery;  // of a target or of what resembles one
 };
 
 /// A set that berth_navset wrote: images.u8, u8[count, side, side], and labels.csv.
