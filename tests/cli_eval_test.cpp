@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "support/block_picture.hpp"
 #include "support/command_run.hpp"
 #include "support/pictures.hpp"
 
@@ -43,6 +44,38 @@ TEST(CliEval, JudgesTheTestPartAndComparesBackends) {
   EXPECT_THAT(run.out, HasSubstr("| 0.45 |"));
   EXPECT_THAT(run.out, HasSubstr("| robot | 0 | 0 |"));
   EXPECT_EQ(run.out.find("differs"), std::string::npos);
+}
+
+TEST(CliEval, SetsOrbBesideTheNetworkAndDraws) {
+  const ScratchFolder folder;
+  folder.write("labels.csv",
+               kHeader +
+                   "0,train,1,target,1.0,30,30,225,225,30,30,225,225,180.0,128,128,2.0,2.1,600,128,128,sun,lab-1,gold\n"
+                   "1,test,1,target,1.0,30,30,225,225,30,30,225,225,180.0,135,135,2.0,2.1,600,128,128,sun,lab-1,gold\n"
+                   "2,test,0,robot,0.0,0,0,0,0,0,0,0,0,0,0,0,0,0,600,128,128,lamps,lab-4,\n");
+  std::vector<u8> pixels = test::block_picture(1, 256);
+  for (const std::vector<u8>& more : {test::block_picture(1, 256, 7), std::vector<u8>(256 * 256, 90)}) {
+    pixels.insert(pixels.end(), more.begin(), more.end());
+  }
+  folder.write("images.u8", pixels);
+  const std::string plots = folder / "new/plots";
+  const test::CommandRun run = run_berth({"eval", kTiny, folder.path(), "--orb", "--plots", plots});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("ORB: 500 features, 1 views of the training part"));
+  for (const char* ratio : {"0.45", "0.80"}) {
+    EXPECT_THAT(run.out,
+                testing::ContainsRegex("\n\\| " + std::string(ratio) +
+                                       " \\| [0-9.]+ \\| [0-9.]+ \\| 100.00 \\| 0.00 \\| 100.00 \\| 0.00 \\|\n"));
+  }
+  EXPECT_THAT(run.out, HasSubstr("| to 3.0 m | 1 |"));
+  EXPECT_THAT(run.out, HasSubstr("written: " + plots + "/roc.svg"));
+  EXPECT_THAT(test::text_of(plots + "/roc.svg"), HasSubstr("ORB, homography, ratio 0.45 to 0.80"));
+  EXPECT_THAT(test::text_of(plots + "/precision-recall.svg"), HasSubstr("tiny, area under the curve"));
+
+  const test::CommandRun refused =
+      run_berth({"eval", kTiny, folder.path(), "--plots", folder.write("file", std::string("x")) + "/below"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("choose another for --plots"));
 }
 
 TEST(CliEval, SaysWhatIsWrongWithASet) {

@@ -121,7 +121,7 @@ void write_plots(const EvalCommand& command, const std::string& network, const s
                  const std::vector<Rival>& rivals, Console& console) {
   RocPlot plot{network, curve_of(judged), q15(command.threshold), {}};
   for (const Rival& rival : rivals) {
-    MarkedSeries series{rival.name, {}};
+    MarkedSeries series{rival.name + ", ratio 0.45 to 0.80", {}};
     for (std::size_t i = 0; i < kTableThresholds.size(); ++i) {
       series.marks.push_back({fmt::format("{:.2f}", kTableThresholds[i] / 100.0), rival.decisions[i]});
     }

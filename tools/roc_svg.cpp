@@ -74,20 +74,19 @@ std::string series(const SvgPanel& panel, const MarkedSeries& marked, std::size_
 
 std::string legend(const RocPlot& plot, const std::optional<double>& area) {
   double y = kLegend;
-  const auto line = [&](const char* colour, double width, const std::string& text) {
-    const std::string entry =
-        fmt::format("<path d='M{:.1f} {:.1f}h24' stroke='{}' stroke-width='{}'/>\n", kLeft, y - 4, colour, width) +
-        text_at(kLeft + 34, y, text);
+  std::string svg;
+  const auto line = [&](const char* colour, double width, double dot, const std::string& text) {
+    svg += fmt::format(
+        "<path d='M{0:.1f} {1:.1f}h24' stroke='{2}' stroke-width='{3}'/><circle cx='{4:.1f}' cy='{1:.1f}' r='{5}' "
+        "fill='{2}'/>\n",
+        kLeft, y - 4, colour, width, kLeft + 12, dot);
+    svg += text_at(kLeft + 34, y, text);
     y += kLine;
-    return entry;
   };
-  std::string svg = line(kNetworkColour, 2,
-                         plot.network + ", area under the curve " +
-                             (area ? fmt::format("{:.5f}", *area) : "undefined: one kind of image is missing"));
-  for (std::size_t i = 0; i < plot.others.size(); ++i) {
-    svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='3.5' fill='{}'/>\n", kLeft + 12, y - 4, colour_of(i)) +
-           line(colour_of(i), 1, plot.others[i].name);
-  }
+  line(kNetworkColour, 2, 5,
+       plot.network + ", area under the curve " +
+           (area ? fmt::format("{:.5f}", *area) : "undefined: one kind of image is missing"));
+  for (std::size_t i = 0; i < plot.others.size(); ++i) line(colour_of(i), 1, 3.5, plot.others[i].name);
   return svg;
 }
 
