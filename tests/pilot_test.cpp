@@ -204,6 +204,19 @@ TEST(CliFlight, DrawsOneFlight) {
   EXPECT_LT(log[0]["marker"]["off"].get<double>(), 0.02);
 }
 
+TEST(CliFlight, NavigatesByTheNetworkThatComesWithBerth) {
+  const test::ScratchFolder folder;
+  const test::CommandRun run =
+      test::run_berth({"flight", "--seed", "3", "--frames", "24", "--out", folder / "one", "--backend", "simd"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("navigation: the target is seen"));
+  EXPECT_THAT(run.out, HasSubstr("longest gap 0 frames, 0 frames with something else"));
+  const auto log = test::CommandRun::json_lines(test::text_of(folder / "one/flight.jsonl"));
+  ASSERT_EQ(log.size(), 1u);
+  EXPECT_GT(log[0]["network"]["frames"].get<int>(), 5);
+  EXPECT_LT(log[0]["network"]["off"].get<double>(), 0.2);
+}
+
 TEST(CliFlight, GoesOnWithACampaign) {
   const test::ScratchFolder folder;
   const auto fly = [&](const char* count) {
