@@ -103,7 +103,7 @@ TEST(Navigator, GivesBearingAndRangeThroughTheCamera) {
   EXPECT_NEAR(pixel[1], static_cast<double>(s.y_q16) / 65536, 1e-3);
   const double depth = s.range_m * s.bearing[2];
   EXPECT_NEAR(depth * static_cast<double>(s.d_q16) / 65536, (config.camera->fx + config.camera->fy) / 2 * 0.4, 1e-6);
-  EXPECT_NEAR(s.range_deviation_m, 0.1 * s.range_m, 1e-12);
+  EXPECT_NEAR(s.range_deviation_m, config.range_deviation * s.range_m, 1e-12);
 }
 
 TEST(Navigator, RefusesWhatItCannotDo) {
