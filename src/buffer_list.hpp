@@ -11,10 +11,10 @@
 namespace berth {
 
 /// Fills a buffer before the first frame. Throws Error when the device is lost.
-inline void upload_at_start(Backend& backend, Buffer& buffer, const void* data, std::size_t bytes) {
-  const std::unique_ptr<Stream> stream = backend.make_stream();
-  stream->upload(buffer, data, bytes);
-  if (!stream->finish()) throw Error(std::string(backend.name()) + ": the device was lost at start");
+inline void upload_at_start(const Backend& backend, Stream& stream, Buffer& buffer, const void* data,
+                            std::size_t bytes) {
+  stream.upload(buffer, data, bytes);
+  if (!stream.finish()) throw Error(std::string(backend.name()) + ": the device was lost at start");
 }
 
 /// The buffers of a plan, kept together for as long as it lives.

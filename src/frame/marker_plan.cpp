@@ -115,7 +115,7 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
   const MarkerGeometry& g = geometry();
   const std::vector<u32> packed = pack_gains(gains, g);
   Buffer* buffer = buffers_.make(packed.size());
-  upload_at_start(backend_, *buffer, packed.data(), packed.size() * 4);
+  upload_at_start(backend_, *backend_.make_stream(), *buffer, packed.data(), packed.size() * 4);
   const int words = static_cast<int>(g.frame_bytes() / 4);
   Buffer* pixels = buffers_.make(g.frame_bytes() / 4);
   steps_.push_back(make_step(flat_field_params{words}, {frame_, buffer, pixels}, words));

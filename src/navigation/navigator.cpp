@@ -60,7 +60,7 @@ struct Navigator::Impl {
         search_sums(search.sums().bytes() / 4),
         close_sums(close.sums().bytes() / 4),
         candidates(static_cast<std::size_t>(search.grid_width() * search.grid_height())) {
-    upload_at_start(backend_, search.windows(), whole.data(), sizeof whole);
+    upload_at_start(backend_, *stream, search.windows(), whole.data(), sizeof whole);
   }
 
   FrameView view() const { return {frame.get(), width, height, padded_width}; }

@@ -72,14 +72,16 @@ std::vector<s32> channel_pairs(const std::vector<s32>& bias, const std::vector<s
 
 DeviceNetwork::DeviceNetwork(Backend& backend, const Network& network)
     : backend_(backend), network_(network), buffers_(backend) {
+  const std::unique_ptr<Stream> stream = backend.make_stream();
   const auto weighted = [&](const std::vector<u32>& weights, const std::vector<s32>& channels) {
-    constants_.push_back({add(weights.data(), weights.size() * 4), add(channels.data(), channels.size() * 4)});
+    constants_.push_back(
+        {add(*stream, weights.data(), weights.size() * 4), add(*stream, channels.data(), channels.size() * 4)});
   };
   for (const Layer& layer : network.layers) {
     if (const auto* convolve = std::get_if<ConvolveLayer>(&layer)) {
       weighted(packed_weights(*convolve), channel_pairs(convolve->bias, convolve->multipliers, convolve->out_channels));
     } else if (const auto* norm = std::get_if<LocalResponseNormLayer>(&layer)) {
-      constants_.push_back({add(norm->table.data(), sizeof norm->table)});
+      constants_.push_back({add(*stream, norm->table.data(), sizeof norm->table)});
     } else if (const auto* full = std::get_if<FullyConnectedLayer>(&layer)) {
       weighted(packed_rows(full->weights, full->out_channels, full->rows * full->columns, full->in_channels,
                            full->out_channels),
@@ -95,9 +97,9 @@ DeviceNetwork::DeviceNetwork(Backend& backend, const Network& network)
            channel_pairs(heads.bias, {}, out_channels));
 }
 
-Buffer* DeviceNetwork::add(const void* data, std::size_t bytes) {
+Buffer* DeviceNetwork::add(Stream& stream, const void* data, std::size_t bytes) {
   Buffer* buffer = buffers_.make(bytes / 4);
-  upload_at_start(backend_, *buffer, data, bytes);
+  upload_at_start(backend_, stream, *buffer, data, bytes);
   return buffer;
 }
 
@@ -209,7 +211,7 @@ Buffer* NetworkPlan::add_input(const FrameView& frame, int count) {
   } else {
     std::vector<s32> fixed;
     for (int i = 0; i < count; ++i) fixed.insert(fixed.end(), {network.mean, 256});
-    upload_at_start(device_.backend(), *statistics, fixed.data(), fixed.size() * 4);
+    upload_at_start(device_.backend(), *device_.backend().make_stream(), *statistics, fixed.data(), fixed.size() * 4);
   }
   steps_.push_back(make_step(normalize_window_params{count, words}, {pixels, statistics, input}, all));
   return input;

@@ -22,7 +22,7 @@ class DeviceNetwork {
   std::size_t device_bytes() const { return buffers_.device_bytes(); }
 
  private:
-  Buffer* add(const void* data, std::size_t bytes);
+  Buffer* add(Stream& stream, const void* data, std::size_t bytes);
 
   Backend& backend_;
   const Network& network_;

@@ -24,7 +24,7 @@ WindowScorer::WindowScorer(Backend& backend, const Network& network, int batch)
       sums_(plan_.sums().bytes() / 4) {
   std::vector<s32> windows;  // the images below each other
   for (int k = 0; k < batch; ++k) windows.insert(windows.end(), {0, k * network.side * 256, 256, 0});
-  upload_at_start(backend, plan_.windows(), windows.data(), windows.size() * 4);
+  upload_at_start(backend, *stream_, plan_.windows(), windows.data(), windows.size() * 4);
 }
 
 std::vector<WindowScore> WindowScorer::score(const u8* images, int count) {
