@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "berth/error.hpp"
+#include "flight_run.hpp"
 #include "navset/flight.hpp"
 #include "pilot/mode_switch.hpp"
 #include "support/command_run.hpp"
@@ -103,14 +104,9 @@ TEST_F(Modes, WhatWasNotLookedForChangesNothing) {
 }
 
 PilotConfig flight_config() {
-  PilotConfig config;
-  config.detector.camera = navset::Flight::camera();
-  config.detector.marker_size_m = navset::kDockMarkerSide_m;
-  config.navigator.network = kTiny;
+  PilotConfig config = cli::flight_pilot(kTiny);
   config.navigator.threshold_q15 = 32769;  // it knows nothing: let it say nothing
   config.navigator.search_threshold_q15 = 32769;
-  config.marker = navset::kDockMarker;
-  config.target_in_marker_m = {0, 0, -navset::dock_marker_pose().t[2]};
   return config;
 }
 

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "berth/error.hpp"
+#include "output_file.hpp"
 
 namespace berth::cli {
 namespace {
@@ -187,14 +185,7 @@ void write_annotated(const std::string& path, View2D<const u8> image, const std:
     draw_label(canvas, family + " " + std::to_string(detections[d].id), quad, taken);
   }
   if (one_family && !detections.empty()) canvas.caption(detections[0].family->name);
-  // Encoded here and written as bytes: cv::imwrite tells neither which part failed nor that the disk is full.
-  std::vector<u8> png;
-  if (!cv::imencode(".png", canvas.picture(), png)) throw Error(path + ": the picture cannot be encoded as PNG");
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
-  file.close();
-  if (!file)
-    throw Error(path + ": the annotated picture cannot be written; check the folder, its permissions and space");
+  write_png(path, "the annotated picture", canvas.picture());
 }
 
 }  // namespace berth::cli

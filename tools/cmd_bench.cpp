@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <sstream>
 
@@ -13,6 +12,7 @@
 #include "engine.hpp"
 #include "frame/traffic.hpp"
 #include "frame_json.hpp"
+#include "output_file.hpp"
 #include "quantile.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
@@ -189,11 +189,7 @@ int run_bench(const BenchCommand& command, Console& console) {
   }
   console.out() << explanations.str();
   if (command.report.empty()) return kOk;
-  std::ofstream file(command.report, std::ios::binary);
-  file << to_line(report) << '\n';
-  file.close();
-  if (!file)
-    throw Error(command.report + ": the report cannot be written; check the folder, its permissions and space");
+  write_file(command.report, "the report", to_line(report) + '\n');
   return kOk;
 }
 

@@ -5,6 +5,7 @@
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
+#include "output_file.hpp"
 #include "shared_file.hpp"
 #include "stream.hpp"
 
@@ -44,11 +45,7 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
                                      ? shared_file("scenarios/approach.toml", "name a scenario by --scenario")
                                      : options->scenario;
     const std::unique_ptr<Source> source = open_source("sim:" + scenario);
-    std::error_code error;
-    fs::create_directories(options->out, error);
-    if (error) {
-      throw Error(options->out + ": the folder cannot be made (" + error.message() + "); name another by --out");
-    }
+    make_folder(options->out, "name another by --out");
     const fs::path out(options->out);
     options->stream.log = (out / "log.jsonl").string();
     options->stream.svg = (out / "trajectory.svg").string();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 
 #include "berth/error.hpp"
@@ -14,6 +13,7 @@
 #include "frame/digest.hpp"
 #include "navigation/window_scorer.hpp"
 #include "orb_matcher.hpp"
+#include "output_file.hpp"
 #include "roc_svg.hpp"
 
 namespace berth::cli {
@@ -131,19 +131,9 @@ void write_plots(const EvalCommand& command, const std::string& network, const s
   for (const auto& [name, drawing] :
        {std::pair("roc.svg", roc_svg(plot)), std::pair("precision-recall.svg", precision_recall_svg(plot))}) {
     const std::string path = (std::filesystem::path(command.plots) / name).string();
-    std::ofstream file(path, std::ios::binary);
-    file << drawing;
-    file.close();
-    if (!file) throw Error(path + ": the drawing cannot be written; check the folder, its permissions and space");
+    write_file(path, "the drawing", drawing);
     console.out() << "written: " << path << '\n';
   }
-}
-
-/// Before minutes of work, not after.
-void make_folder(const std::string& path) {
-  std::error_code error;
-  std::filesystem::create_directories(path, error);
-  if (error) throw Error(path + ": the folder cannot be made (" + error.message() + "); choose another for --plots");
 }
 
 int run_eval(const EvalCommand& command, Console& console) {
@@ -151,7 +141,8 @@ int run_eval(const EvalCommand& command, Console& console) {
   const LabelledSet set(command.set, command.part, network.side);
   const std::size_t count =
       command.limit > 0 ? std::min(set.images().size(), static_cast<std::size_t>(command.limit)) : set.images().size();
-  if (!command.plots.empty()) make_folder(command.plots);
+  // Before minutes of work, not after.
+  if (!command.plots.empty()) make_folder(command.plots, "choose another for --plots");
   const std::vector<std::string> names = command.backends.empty() ? std::vector<std::string>{"simd"} : command.backends;
   std::vector<Run> runs;
   for (const std::string& name : names) runs.push_back(run_on(name, command, network, set, count, console));

@@ -4,12 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <thread>
 
@@ -19,6 +17,7 @@
 #include "film_strip.hpp"
 #include "flight_run.hpp"
 #include "flight_svg.hpp"
+#include "output_file.hpp"
 #include "shared_file.hpp"
 
 namespace berth::cli {
@@ -54,13 +53,6 @@ struct Crew {
   std::unique_ptr<Pilot> pilot;
 };
 
-void write_file(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw Error(path.string() + ": cannot be written; check the folder, its permissions and space");
-}
-
 int fly_one(const FlightCommand& command, Console& console) {
   Crew crew(command);
   const navset::Flight flight(command.seed, command.frames);
@@ -68,25 +60,27 @@ int fly_one(const FlightCommand& command, Console& console) {
                                crew.backend->device().name);
   FilmStrip strip(navset::Flight::camera(), navset::kTargetDiameter_m);
   int index = 0;
+  const int last = command.frames - 1;
+  const auto part = [last](int frame) { return frame * 8 / last; };  // nine pictures
   const auto watch = [&](const navset::FlightFrame& truth, const PilotFrame& found) {
-    const int last = command.frames - 1;
-    const bool pictured = index * 8 / std::max(1, last) != (index - 1) * 8 / std::max(1, last) || index == 0;
-    const double range = std::sqrt(sim::dot(truth.target.t, truth.target.t));
-    if (pictured) strip.add(truth.image.view(), found, fmt::format("{:.2f} m  {}", range, name_of(found.mode)));
+    const double range = sim::length(truth.target.t);
+    if (index == 0 || part(index) != part(index - 1)) {
+      strip.add(truth.image.view(), found, fmt::format("{:.2f} m  {}", range, name_of(found.mode)));
+    }
     if (found.change[0] != '\0') {
       console.out() << fmt::format("  frame {:>3}  {:.2f} m  {}: {}\n", index, range, name_of(found.mode),
                                    found.change);
     }
     if (console.out_is_terminal()) {
-      console.out() << fmt::format("\r  {:3.0f} %  {}\x1b[K\r", 100.0 * index / std::max(1, last), name_of(found.mode))
+      console.out() << fmt::format("\r  {:3.0f} %  {}\x1b[K\r", 100.0 * index / last, name_of(found.mode))
                     << std::flush;
     }
     ++index;
   };
   const FlightLog log = fly(flight, command.seed, *crew.pilot, watch);
   const fs::path out(command.out);
-  write_file(out / "flight.svg", flight_svg(log));
-  write_file(out / "flight.jsonl", to_json_line(log) + "\n");
+  write_file((out / "flight.svg").string(), "the drawing", flight_svg(log));
+  write_file((out / "flight.jsonl").string(), "the log", to_line(to_json(log)) + "\n");
   strip.write((out / "flight.png").string(), 3);
   console.out() << fmt::format("{}; longest gap {} frames, {} frames with something else for the target\n",
                                log.docked() ? "docked" : "NOT docked", log.longest_gap(), log.wrong())
@@ -96,22 +90,22 @@ int fly_one(const FlightCommand& command, Console& console) {
 }
 
 /// The lines of earlier flights; one cut off in the middle does not count.
-std::vector<nlohmann::json> read_lines(const fs::path& path) {
-  std::vector<nlohmann::json> lines;
+std::vector<Json> read_lines(const fs::path& path) {
+  std::vector<Json> lines;
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
-    nlohmann::json parsed = nlohmann::json::parse(line, nullptr, false);
+    Json parsed = Json::parse(line, nullptr, false);
     if (!parsed.is_discarded()) lines.push_back(std::move(parsed));
   }
   return lines;
 }
 
 /// Of flights without a target.
-void sum_up_alarms(const std::vector<nlohmann::json>& flights, Console& console) {
+void sum_up_alarms(const std::vector<Json>& flights, Console& console) {
   long frames = 0;
   long sightings = 0;
   int believed = 0;
-  for (const nlohmann::json& flight : flights) {
+  for (const Json& flight : flights) {
     frames += flight.at("frames").get<long>();
     sightings += flight.at("sightings").get<long>();
     believed += flight.at("changes").empty() ? 0 : 1;
@@ -123,13 +117,13 @@ void sum_up_alarms(const std::vector<nlohmann::json>& flights, Console& console)
       believed);
 }
 
-void sum_up(const std::vector<nlohmann::json>& flights, Console& console) {
+void sum_up(const std::vector<Json>& flights, Console& console) {
   int docked = 0;
   int gaps = 0;
   int wrong = 0;
   int longest = 0;
   std::size_t changes = 0;
-  for (const nlohmann::json& flight : flights) {
+  for (const Json& flight : flights) {
     docked += flight.at("docked").get<bool>() ? 1 : 0;
     gaps += flight.at("longest_gap").get<int>() > 3 ? 1 : 0;
     wrong += flight.at("wrong").get<int>() > 0 ? 1 : 0;
@@ -144,61 +138,89 @@ void sum_up(const std::vector<nlohmann::json>& flights, Console& console) {
       static_cast<double>(changes) / static_cast<double>(std::max<std::size_t>(1, flights.size())));
 }
 
-int fly_many(const FlightCommand& command, Console& console) {
-  const fs::path path = fs::path(command.out) / (command.empty ? "empty.jsonl" : "flights.jsonl");
-  std::vector<nlohmann::json> flights = read_lines(path);
-  std::set<std::uint64_t> flown;
-  for (const nlohmann::json& flight : flights) flown.insert(flight.at("seed").get<std::uint64_t>());
-  // Whole lines only, before more are added.
-  std::string text;
-  for (const nlohmann::json& flight : flights) text += flight.dump() + "\n";
-  write_file(path, text);
-  std::ofstream file(path, std::ios::binary | std::ios::app);
-  std::vector<std::uint64_t> seeds;
-  for (int k = 0; k < command.count; ++k) {
-    const std::uint64_t seed = command.seed + static_cast<std::uint64_t>(k);
-    if (flown.count(seed) == 0) seeds.push_back(seed);
-  }
-  std::atomic<std::size_t> next{0};
-  std::mutex mutex;
-  std::string failure;
-  const auto work = [&] {
-    try {
-      while (true) {
-        const std::size_t k = next++;
-        if (k >= seeds.size()) return;
-        // A new pilot each: nothing of one flight may reach the next.
-        const Crew crew(command);
-        const std::string line =
-            to_json_line(fly(navset::Flight(seeds[k], command.frames, !command.empty), seeds[k], *crew.pilot));
-        const std::lock_guard<std::mutex> lock(mutex);
-        file << line << '\n' << std::flush;
-        flights.push_back(nlohmann::json::parse(line));
-        if (console.out_is_terminal() || flights.size() % 20 == 0) {
-          console.out() << fmt::format("{}{} of {} flights{}", console.out_is_terminal() ? "\r" : "", flights.size(),
-                                       flown.size() + seeds.size(), console.out_is_terminal() ? "\x1b[K" : "\n")
-                        << std::flush;
-        }
-      }
-    } catch (const std::exception& error) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      failure = error.what();
-      next = seeds.size();
+/// Flights by seed, several at a time; a line is written as each one ends.
+class Campaign {
+ public:
+  Campaign(const FlightCommand& command, Console& console)
+      : command_(command),
+        console_(console),
+        path_((fs::path(command.out) / (command.empty ? "empty.jsonl" : "flights.jsonl")).string()),
+        flights_(read_lines(path_)) {
+    std::set<std::uint64_t> flown;
+    std::string whole;  // lines only, before more are added
+    for (const Json& flight : flights_) {
+      flown.insert(flight.at("seed").get<std::uint64_t>());
+      whole += to_line(flight) + "\n";
     }
-  };
-  std::vector<std::thread> crews;
-  for (int k = 0; k < command.jobs; ++k) crews.emplace_back(work);
-  for (std::thread& crew : crews) crew.join();
-  if (!failure.empty()) throw Error(failure);
-  if (!file) throw Error(path.string() + ": writing failed; check the disk's space");
-  console.out() << "log         " << path.string() << '\n';
+    write_file(path_, "the log", whole);
+    file_.open(path_, std::ios::binary | std::ios::app);
+    for (int k = 0; k < command.count; ++k) {
+      const std::uint64_t seed = command.seed + static_cast<std::uint64_t>(k);
+      if (flown.count(seed) == 0) seeds_.push_back(seed);
+    }
+    all_ = flights_.size() + seeds_.size();
+  }
+
+  /// Returns every flight in the log. Throws Error.
+  const std::vector<Json>& run() {
+    std::vector<std::thread> crews;
+    for (int k = 0; k < command_.jobs; ++k) crews.emplace_back([this] { work(); });
+    for (std::thread& crew : crews) crew.join();
+    if (!failure_.empty()) throw Error(failure_);
+    if (!file_) throw Error(path_ + ": writing failed; check the disk's space");
+    return flights_;
+  }
+  const std::string& path() const { return path_; }
+
+ private:
+  void work() {
+    try {
+      for (std::size_t k = next_++; k < seeds_.size(); k = next_++) add(flown(seeds_[k]));
+    } catch (const std::exception& error) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      failure_ = error.what();
+      next_ = seeds_.size();
+    }
+  }
+  Json flown(std::uint64_t seed) const {
+    // A new pilot each: nothing of one flight may reach the next.
+    const Crew crew(command_);
+    return to_json(fly(navset::Flight(seed, command_.frames, !command_.empty), seed, *crew.pilot));
+  }
+  void add(Json flight) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    file_ << to_line(flight) << '\n' << std::flush;
+    flights_.push_back(std::move(flight));
+    const bool terminal = console_.out_is_terminal();
+    if (!terminal && flights_.size() % 20 != 0) return;
+    console_.out() << fmt::format("{}{} of {} flights{}", terminal ? "\r" : "", flights_.size(), all_,
+                                  terminal ? "\x1b[K" : "\n")
+                   << std::flush;
+  }
+
+  const FlightCommand& command_;
+  Console& console_;
+  std::string path_;
+  std::vector<Json> flights_;
+  std::vector<std::uint64_t> seeds_;
+  std::size_t all_ = 0;
+  std::ofstream file_;
+  std::atomic<std::size_t> next_{0};
+  std::mutex mutex_;
+  std::string failure_;
+};
+
+int fly_many(const FlightCommand& command, Console& console) {
+  Campaign campaign(command, console);
+  const std::vector<Json>& flights = campaign.run();
+  console.out() << "log         " << campaign.path() << '\n';
   if (command.empty) {
     sum_up_alarms(flights, console);
     return kOk;
   }
   sum_up(flights, console);
-  const bool all = std::all_of(flights.begin(), flights.end(),
-                               [](const nlohmann::json& flight) { return flight.at("docked").get<bool>(); });
+  const bool all =
+      std::all_of(flights.begin(), flights.end(), [](const Json& flight) { return flight.at("docked").get<bool>(); });
   return all ? kOk : kNoResult;
 }
 
@@ -225,11 +247,7 @@ void add_flight(CLI::App& app, Console& console, int& exit_code) {
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
     if (options->network.empty()) options->network = shared_file("models/lite.berthnet", "name a network by --network");
-    std::error_code error;
-    fs::create_directories(options->out, error);
-    if (error) {
-      throw Error(options->out + ": the folder cannot be made (" + error.message() + "); name another by --out");
-    }
+    make_folder(options->out, "name another by --out");
     exit_code = options->count == 1 && !options->empty ? fly_one(*options, console) : fly_many(*options, console);
   });
 }

@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 
 #include "berth/backend.hpp"
@@ -13,6 +12,7 @@
 #include "camera/image_file.hpp"
 #include "commands.hpp"
 #include "frame_json.hpp"
+#include "output_file.hpp"
 #include "verify/verify.hpp"
 
 namespace berth::cli {
@@ -173,10 +173,7 @@ void write_report(const std::string& path, const std::vector<Target>& targets) {
     }
     list.push_back(json);
   }
-  std::ofstream file(path, std::ios::binary);
-  file << to_line(list) << '\n';
-  file.close();
-  if (!file) throw Error(path + ": the report cannot be written; check the folder, its permissions and space");
+  write_file(path, "the report", to_line(list) + '\n');
 }
 
 int run_verify(const VerifyCommand& command, Console& console) {

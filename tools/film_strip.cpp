@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "berth/error.hpp"
+#include "output_file.hpp"
 
 namespace berth::cli {
 namespace {
@@ -62,12 +61,7 @@ void FilmStrip::write(const std::string& path, int columns) const {
     }
   }
   cv::resize(sheet, sheet, {}, 0.75, 0.75, cv::INTER_AREA);
-  bool written = false;
-  try {
-    written = cv::imwrite(path, sheet);
-  } catch (const cv::Exception&) {
-  }
-  if (!written) throw Error(path + ": the picture cannot be written; check the folder, its permissions and space");
+  write_png(path, "the picture", sheet);
 }
 
 }  // namespace berth::cli

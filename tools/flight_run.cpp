@@ -2,26 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "quantile.hpp"
 
 namespace berth::cli {
 namespace {
 
-double length(const std::array<double, 3>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 FlightPoint point_of(int index, const navset::FlightFrame& truth, const PilotFrame& found) {
   FlightPoint point;
   point.frame = index;
   point.mode = found.mode;
   point.change = found.change;
-  point.true_range_m = length(truth.target.t);
+  point.true_range_m = sim::length(truth.target.t);
   point.has_position = found.has_position;
   point.sighted = found.looked_for_target && found.sighting->status == FrameStatus::ok;
   if (!found.has_position) return point;
   point.from_marker = found.from_marker;
-  point.range_m = length(found.position_m);
+  point.range_m = sim::length(found.position_m);
   if (!found.from_marker) point.range_deviation_m = found.sighting->range_deviation_m;
   const CameraModel camera = navset::Flight::camera();
   const auto& p = found.position_m;
@@ -87,8 +84,8 @@ FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const Flight
   return log;
 }
 
-std::string to_json_line(const FlightLog& log) {
-  nlohmann::ordered_json line;
+Json to_json(const FlightLog& log) {
+  Json line;
   line["seed"] = log.seed;
   line["title"] = log.title;
   line["frames"] = log.points.size();
@@ -98,7 +95,7 @@ std::string to_json_line(const FlightLog& log) {
   line["longest_gap"] = log.longest_gap();
   line["wrong"] = log.wrong();
   line["sightings"] = log.sightings();
-  line["changes"] = nlohmann::ordered_json::array();
+  line["changes"] = Json::array();
   for (const FlightPoint& point : log.points) {
     if (point.change.empty()) continue;
     line["changes"].push_back({{"frame", point.frame},
@@ -118,7 +115,7 @@ std::string to_json_line(const FlightLog& log) {
                                                 {"range_error", std::round(quantile(range, 0.5) * 1e5) / 1e5},
                                                 {"off", std::round(quantile(off, 0.5) * 1e5) / 1e5}};
   }
-  return line.dump();
+  return line;
 }
 
 }  // namespace berth::cli

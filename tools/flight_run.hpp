@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "berth/pilot.hpp"
+#include "frame_json.hpp"
 #include "navset/flight.hpp"
 
 namespace berth::cli {
@@ -47,8 +48,8 @@ PilotConfig flight_pilot(const std::string& network);
 using FlightWatcher = std::function<void(const navset::FlightFrame&, const PilotFrame&)>;
 FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const FlightWatcher& seen = {});
 
-/// A JSON line: seed, title, docked, first frames, longest gap, wrong frames, sightings, every change of mode with its
+/// Seed, title, docked, first frames, longest gap, wrong frames, sightings, every change of mode with its
 /// reason, median errors of range and direction by what gave the position.
-std::string to_json_line(const FlightLog& log);
+Json to_json(const FlightLog& log);
 
 }  // namespace berth::cli

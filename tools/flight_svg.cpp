@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "svg_panel.hpp"
+
 namespace berth::cli {
 namespace {
 
@@ -27,11 +29,10 @@ class Plot {
   explicit Plot(const FlightLog& log) : log_(log), last_(std::max<std::size_t>(2, log.points.size()) - 1) {}
 
   std::string text() const {
-    std::string svg = fmt::format(
-        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {0} {1}' font-family='sans-serif' font-size='12'>\n"
-        "<rect width='{0}' height='{1}' fill='white'/>\n<text x='{2}' y='24' font-size='16'>Flight {3}: {4}</text>\n",
-        kLeft + kWidth + 24, kTop + kHeight + kBottom, kLeft, log_.seed, log_.title);
-    return svg + bands() + axes() + truth() + dots() + legend() + "</svg>\n";
+    const std::string svg =
+        svg_head(kLeft + kWidth + 24, kTop + kHeight + kBottom, fmt::format("Flight {}: {}", log_.seed, log_.title)) +
+        "<g font-size='12'>\n";
+    return svg + bands() + axes() + truth() + dots() + legend() + "</g></svg>\n";
   }
 
  private:

@@ -13,6 +13,7 @@
 #include "berth/error.hpp"
 #include "frame_json.hpp"
 #include "live_view.hpp"
+#include "output_file.hpp"
 #include "trajectory_svg.hpp"
 #include "truth_score.hpp"
 
@@ -257,11 +258,7 @@ class StreamRun {
     const auto scored = score_.markers().find(most->first);
     trajectory.size_m = scored != score_.markers().end() ? scored->second.size_m : engine_->config().marker_size_m;
     trajectory.points = most->second;
-    std::ofstream file(options_.svg, std::ios::binary);
-    file << trajectory_svg(trajectory);
-    file.close();
-    if (!file)
-      throw Error(options_.svg + ": the drawing cannot be written; check the folder, its permissions and space");
+    write_file(options_.svg, "the drawing", trajectory_svg(trajectory));
     people_ << "trajectory  " << options_.svg << '\n';
   }
 
