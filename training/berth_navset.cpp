@@ -23,7 +23,7 @@ using namespace berth;
 using namespace berth::navset;
 
 /// Rises with every change that moves a bit of a set.
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 
 std::vector<std::string> mesh_files(const std::string& folder) {
   std::vector<std::string> files;
@@ -136,7 +136,7 @@ int main(int argc, char** argv) {
   Sources sources;
   std::string folder;
   int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  app.add_option("set", plan.name, "paper-split, disjoint or look-alike")->required();
+  app.add_option("set", plan.name, "paper-split, disjoint, look-alike or hard")->required();
   app.add_option("folder", folder, "Where to write")->required();
   app.add_option("--seed", plan.seed, "Another seed, other images")->capture_default_str();
   app.add_option("--train", plan.train, "Training images")->capture_default_str();

@@ -72,9 +72,9 @@ double metered(const std::vector<double>& radiance) {
   return sum;
 }
 
-Exposure random_exposure(const std::vector<double>& radiance, sim::Random& random) {
+Exposure random_exposure(const std::vector<double>& radiance, double dimmest, sim::Random& random) {
   Exposure e;
-  e.gain = std::min(4.0, std::max(0.3, log_uniform(random, 0.3, 1.25) / std::max(0.02, metered(radiance))));
+  e.gain = std::min(4.0, std::max(0.3, log_uniform(random, dimmest, 1.25) / std::max(0.02, metered(radiance))));
   if (random.chance(0.5)) e.gamma = random.uniform(0.7, 1.25);
   e.black_level = random.uniform(0, 10);
   e.blur_sigma_px = log_uniform(random, 0.3, 1.5);

@@ -22,8 +22,8 @@ struct Exposure {
 /// What automatic exposure goes by: half the brightness that a tenth of the pixels reach and half that which one in a
 /// hundred does, together.
 double metered(const std::vector<double>& radiance);
-/// A camera's automatic exposure, now and then a poor one: metered on the brighter parts of the radiance.
-Exposure random_exposure(const std::vector<double>& radiance, sim::Random& random);
+/// A camera's automatic exposure, metered on the brighter parts of the radiance: from `dimmest` to 1.25 of a good one.
+Exposure random_exposure(const std::vector<double>& radiance, double dimmest, sim::Random& random);
 
 /// A square window of a backdrop as radiance double[256, 256]: cut, turned (by any angle where nothing has an up),
 /// mirrored, brightened or darkened.

@@ -4,20 +4,15 @@
 
 #include "navset/lighting.hpp"
 #include "navset/parts.hpp"
+#include "navset/sample.hpp"
 
 namespace berth::navset {
 namespace {
 
-constexpr int kWidth_px = 640, kHeight_px = 480, kBackdrop_px = 800;
-constexpr double kFocal_px = 669;
+constexpr int kBackdrop_px = 800;
 // Amplitudes far away; they shrink on the way.
 constexpr double kSwing_x = 0.20, kSwing_y = 0.12;  // of the marker's direction, as slopes
 constexpr double kTilt_rad = 0.35;
-
-template <class T>
-const T& pick(sim::Random& random, const std::vector<T>& from) {
-  return from[static_cast<std::size_t>(random.integer(0, static_cast<int>(from.size()) - 1))];
-}
 
 }  // namespace
 
@@ -54,11 +49,11 @@ Flight::Flight(u64 seed, int frames, bool with_target)
 
 CameraModel Flight::camera() {
   CameraModel model;
-  model.width = kWidth_px;
-  model.height = kHeight_px;
-  model.fx = model.fy = kFocal_px;
-  model.cx = (kWidth_px - 1) / 2.0;
-  model.cy = (kHeight_px - 1) / 2.0;
+  model.width = kFrameWidth_px;
+  model.height = kFrameHeight_px;
+  model.fx = model.fy = kFrameFocal_px;
+  model.cx = (kFrameWidth_px - 1) / 2.0;
+  model.cy = (kFrameHeight_px - 1) / 2.0;
   return model;
 }
 
@@ -82,12 +77,12 @@ void Flight::place(double u, FlightFrame& frame) const {
 }
 
 std::vector<double> Flight::background(double u) const {
-  const int slack_x = kBackdrop_px - kWidth_px, slack_y = kBackdrop_px - kHeight_px;
+  const int slack_x = kBackdrop_px - kFrameWidth_px, slack_y = kBackdrop_px - kFrameHeight_px;
   const int x0 = static_cast<int>(slack_x * (0.5 + 0.5 * pan_.at(u))), y0 = static_cast<int>(slack_y * u);
   std::vector<double> radiance;
-  radiance.reserve(static_cast<std::size_t>(kWidth_px) * kHeight_px);
-  for (int y = 0; y < kHeight_px; ++y) {
-    for (int x = 0; x < kWidth_px; ++x) radiance.push_back(backdrop_.view().at(x0 + x, y0 + y) * (0.8 / 255));
+  radiance.reserve(static_cast<std::size_t>(kFrameWidth_px) * kFrameHeight_px);
+  for (int y = 0; y < kFrameHeight_px; ++y) {
+    for (int x = 0; x < kFrameWidth_px; ++x) radiance.push_back(backdrop_.view().at(x0 + x, y0 + y) * (0.8 / 255));
   }
   return radiance;
 }
@@ -99,9 +94,9 @@ FlightFrame Flight::frame(int index) const {
   Scene scene;
   if (with_target_) scene.place(model_, frame.target, 1, Owner::target);
   Camera pinhole;
-  pinhole.width = kWidth_px;
-  pinhole.height = kHeight_px;
-  pinhole.focal_px = kFocal_px;
+  pinhole.width = kFrameWidth_px;
+  pinhole.height = kFrameHeight_px;
+  pinhole.focal_px = kFrameFocal_px;
   pinhole.cx = camera().cx;
   pinhole.cy = camera().cy;
   std::vector<double> radiance = background(u);
@@ -109,7 +104,7 @@ FlightFrame Flight::frame(int index) const {
   draw(scene, pinhole, light_, mirror, 2, radiance);
   Exposure exposure = exposure_;
   exposure.gain = std::min(4.0, std::max(0.3, brightness_ / std::max(0.02, metered(radiance))));
-  frame.image = GrayImage(kWidth_px, kHeight_px);
+  frame.image = GrayImage(kFrameWidth_px, kFrameHeight_px);
   develop(radiance, exposure, sensor_, sim::scatter(seed_ + static_cast<u64>(index) + 1), frame.image.view());
   return frame;
 }

@@ -75,5 +75,10 @@ Mat3 random_attitude(sim::Random& random);
 Vec3 random_direction(sim::Random& random);
 /// Between low and high > 0, evenly in the logarithm.
 double log_uniform(sim::Random& random, double low, double high);
+/// One of them, each as likely.
+template <class T>
+const T& pick(sim::Random& random, const std::vector<T>& from) {
+  return from[static_cast<std::size_t>(random.integer(0, static_cast<int>(from.size()) - 1))];
+}
 
 }  // namespace berth::navset

@@ -12,19 +12,9 @@ namespace {
 
 using sim::Random;
 
-// The docking camera (design.md's Table 2, halved): a window is a part of its frame, at full size or smaller.
-constexpr double kFrameFocal_px = 669, kFrameWidth_px = 640, kFrameHeight_px = 480;
 // Where the search hands a window over, the target is this near its middle, px; now and then it is anywhere.
 constexpr double kCentring_px = 32, kAnywhere = 0.05;
-// Sizes: a few far ones, the rest evenly in the logarithm.
-constexpr double kLeast_px = 8, kFar_px = 24, kMost_px = 230, kFarShare = 0.01;
-// What changes the image by fewer grey levels is not to be seen.
-constexpr double kLeastContrast = 12.0 / 255;
-
-template <class T>
-const T& pick(Random& random, const std::vector<T>& from) {
-  return from[static_cast<std::size_t>(random.integer(0, static_cast<int>(from.size()) - 1))];
-}
+constexpr double kFarthest_px = 8, kMost_px = 230;
 
 }  // namespace
 
@@ -44,7 +34,7 @@ class Studio::Shot {
     std::vector<double> radiance = cut_backdrop(backdrop_, space_, random_);
     const Surroundings mirror{backdrop_.data, backdrop_.width, random_.uniform(0.4, 1.2)};
     const Sighting seen = draw(scene_, camera_, light_, mirror, 2, radiance);
-    const Exposure exposure = random_exposure(radiance, random_);
+    const Exposure exposure = random_exposure(radiance, pool_.conditions.dimmest, random_);
     if (label_.subject == Subject::target && !judge(seen, exposure.gain)) return false;
     develop(radiance, exposure, studio_.sensor_, random_.bits(), image);
     return !black(image);
@@ -63,8 +53,9 @@ class Studio::Shot {
 
   // Size and place of the subject in the window, and the window's place in the camera's frame.
   void choose_size() {
-    far_ = random_.chance(kFarShare);
-    d_px_ = far_ ? log_uniform(random_, kLeast_px, kFar_px) : log_uniform(random_, kFar_px, kMost_px);
+    const double least = pool_.conditions.least_px;
+    far_ = random_.chance(pool_.conditions.far_share);
+    d_px_ = far_ ? log_uniform(random_, kFarthest_px, least) : log_uniform(random_, least, kMost_px);
     // A window is never cut from nearer than a metre: there the marker has long taken over.
     const double least_focal = std::max(kFrameFocal_px * kSide_px / kFrameWidth_px, d_px_ / kTargetDiameter_m);
     camera_.focal_px = log_uniform(random_, least_focal, kFrameFocal_px);
@@ -170,7 +161,7 @@ class Studio::Shot {
       pose.t = at(x, y, depth);
       scene_.place(thing, pose, scale, Owner::other);
     }
-    if (far_ || !random_.chance(0.5)) return;
+    if (far_ || !random_.chance(pool_.conditions.hidden_share)) return;
     const double depth = std::max(0.3, depth_m_ * random_.uniform(0.4, 0.75));
     if (depth > depth_m_ - 0.25) return;
     const double angle = random_.uniform(0, 2 * sim::kPi), off = d_px_ * random_.uniform(0, 0.4);
@@ -186,7 +177,7 @@ class Studio::Shot {
   bool judge(const Sighting& seen, double gain) {
     if (seen.silhouette == 0) return false;
     label_.visible = static_cast<double>(seen.visible) / static_cast<double>(seen.silhouette);
-    if (label_.visible < kLeastVisible || seen.contrast * gain < kLeastContrast) return false;
+    if (label_.visible < kLeastVisible || 255 * seen.contrast * gain < pool_.conditions.least_contrast) return false;
     label_.visible_box = seen.visible_box;
     label_.full_box = seen.full_box;
     label_.d_px = d_px_;

@@ -12,12 +12,29 @@ namespace berth::navset {
 
 constexpr int kSide_px = 256;
 
+/// The docking camera (the paper's Table 2, halved): a window is a part of its frame, at full size or smaller.
+constexpr int kFrameWidth_px = 640, kFrameHeight_px = 480;
+constexpr double kFrameFocal_px = 669;
+
 /// What an image is about. All but `target` are negatives.
 enum class Subject : u8 { target, background, clutter, robot, satellite, piece, decoy };
 const char* name_of(Subject subject);
 
+/// How well a target can be seen. By default as a search from 6 m hands windows over: at 6 m d is 45 px.
+struct Conditions {
+  double least_px = 40;        ///< of d; sizes are even in its logarithm up to 230 px
+  double far_share = 0;        ///< of targets smaller than that, down to 8 px
+  double hidden_share = 0.2;   ///< of images with something before their subject
+  double least_contrast = 20;  ///< grey levels a target changes its pixels by, on average
+  double dimmest = 0.5;        ///< least exposure, of a good one
+
+  /// What is hard for people too.
+  static Conditions hard() { return {24, 0.01, 0.5, 12, 0.3}; }
+};
+
 /// What images of one part of a set may be made from: indices into gallery, liveries() and meshes.
 struct Pool {
+  Conditions conditions;
   std::vector<int> backdrops[2];  ///< rendered, photographs
   std::vector<int> liveries;
   std::vector<int> meshes;

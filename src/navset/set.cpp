@@ -22,8 +22,8 @@ struct Share {
   Subject subject;
   int percent;
 };
-constexpr Share kMixed[] = {{Subject::background, 38}, {Subject::clutter, 24}, {Subject::robot, 12},
-                            {Subject::satellite, 12},  {Subject::piece, 6},    {Subject::decoy, 8}};
+constexpr Share kMixed[] = {{Subject::background, 56}, {Subject::clutter, 16}, {Subject::robot, 8},
+                            {Subject::satellite, 8},   {Subject::piece, 6},    {Subject::decoy, 6}};
 
 void add_part(std::vector<Subject>& all, const SetPlan& plan, int count, sim::Random& random) {
   std::vector<Subject> part;
@@ -47,8 +47,9 @@ void add_part(std::vector<Subject>& all, const SetPlan& plan, int count, sim::Ra
 }
 
 Pool make_pool(const SetPlan& plan, bool test, const Gallery& gallery, std::size_t meshes) {
-  const bool all = plan.name != "disjoint";
+  const bool all = plan.name != "disjoint" && plan.name != "hard";
   Pool pool;
+  if (plan.name == "hard") pool.conditions = Conditions::hard();
   for (int i = 0; i < gallery.count(); ++i) {
     if (all || gallery.held_out(i) == test) pool.backdrops[gallery.kind(i) == BackdropKind::photo ? 1 : 0].push_back(i);
   }
@@ -87,8 +88,8 @@ std::ofstream open_for_writing(const std::string& path) {
 }  // namespace
 
 void SetPlan::check() const {
-  if (name != "paper-split" && name != "disjoint" && name != "look-alike") {
-    throw Error("no set " + name + ": use paper-split, disjoint or look-alike");
+  if (name != "paper-split" && name != "disjoint" && name != "look-alike" && name != "hard") {
+    throw Error("no set " + name + ": use paper-split, disjoint, look-alike or hard");
   }
   if (train < 0 || test < 0 || count() < 1 || train > 1000000 || test > 1000000) {
     throw Error("a set has 1 to 1,000,000 images in each part");

@@ -12,6 +12,7 @@ namespace berth::navset {
 struct SetPlan {
   /// `paper-split`: training and test images from one pool. `disjoint`: the test's backgrounds, liveries and meshes are
   /// never seen in training. `look-alike`: one pool, all negatives are other satellites.
+  /// `hard`: as `disjoint`, with small, hidden and dim targets (Conditions::hard).
   std::string name = "paper-split";
   u64 seed = 1;
   /// The paper's numbers; in each part 40 positives to 97 negatives.
