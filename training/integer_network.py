@@ -131,7 +131,7 @@ class _Norm:
     def __call__(self, a):
         halves = F.pad(a * a >> 1, (0, 0, 0, 0, 2, 2))
         total = sum(halves[:, k:k + a.shape[1]] for k in range(5))
-        return ((a * self.factor[total]).add_(1 << 13) >> 14).clamp_(max=127)
+        return ((a * self.factor[total.long()]).add_(1 << 13) >> 14).clamp_(max=127)
 
 
 class _Pool:
