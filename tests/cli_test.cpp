@@ -234,9 +234,20 @@ TEST(Run, EndsAtMaxFrames) {
             2u);
 }
 
-TEST(Demo, LeavesLogDrawingAndPicture) {
+TEST(Demo, FliesFromFirstSightToTheMarker) {
   const ScratchFolder folder;
-  const CommandRun run = run_berth({"demo", "--out", folder / "new/demo", "--max-frames", "3"});
+  const CommandRun run = run_berth({"demo", "--frames", "24", "--seed", "3", "--out", folder / "new/demo"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("-> docking: the marker is read and near"));
+  EXPECT_THAT(run.out, HasSubstr("\ndocked; longest gap"));
+  EXPECT_THAT(text_of(folder / "new/demo/flight.svg"), StartsWith("<svg "));
+  EXPECT_FALSE(cv::imread(folder / "new/demo/flight.png").empty());
+}
+
+TEST(Demo, LeavesLogDrawingAndPictureOfAScenario) {
+  const ScratchFolder folder;
+  const std::string scenario = std::string(BERTH_SOURCE_DIR) + "/scenarios/approach.toml";
+  const CommandRun run = run_berth({"demo", "--scenario", scenario, "--out", folder / "new/demo", "--max-frames", "3"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("errors against the simulator's truth"));
   const std::vector<json> log = CommandRun::json_lines(text_of(folder / "new/demo/log.jsonl"));

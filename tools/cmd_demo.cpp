@@ -1,12 +1,11 @@
-// berth demo: a simulated approach through docking, with the errors against its truth.
+// berth demo: a simulated flight from the first sight of the target to its marker; or a scenario of markers alone.
 #include <filesystem>
 #include <memory>
 
-#include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
+#include "flight_show.hpp"
 #include "output_file.hpp"
-#include "shared_file.hpp"
 #include "stream.hpp"
 
 namespace berth::cli {
@@ -19,39 +18,50 @@ constexpr const char* kExamples = R"(Examples:
   berth demo --backend opencl --out /tmp/demo
   berth demo --scenario scenarios/rectangle.toml --max-frames 100
 
-Writes into --out: log.jsonl (a JSON line a frame, with the truth), trajectory.svg, markers.png.)";
+Writes into --out the whole flight: flight.svg, flight.png, flight.jsonl. With --scenario, markers alone: log.jsonl (a
+JSON line a frame, with the truth), trajectory.svg, markers.png.)";
+
+struct DemoCommand {
+  FlightOptions flight;
+  std::string scenario;
+  std::uint64_t max_frames = 0;
+};
+
+int show_scenario(const DemoCommand& command, Console& console) {
+  const std::unique_ptr<Source> source = open_source("sim:" + command.scenario);
+  make_folder(command.flight.out, "name another by --out");
+  const fs::path out(command.flight.out);
+  StreamOptions stream;
+  stream.engine = command.flight.engine;
+  stream.max_frames = command.max_frames;
+  stream.log = (out / "log.jsonl").string();
+  stream.svg = (out / "trajectory.svg").string();
+  stream.picture = (out / "markers.png").string();
+  console.out() << "scenario    " << command.scenario << '\n';
+  return run_stream(*source, stream, console).with_markers > 0 ? kOk : kNoResult;
+}
 
 }  // namespace
 
 void add_demo(CLI::App& app, Console& console, int& exit_code) {
-  struct Options {
-    std::string scenario;
-    std::string out = "berth-demo";
-    StreamOptions stream;
-  };
-  CLI::App* command = app.add_subcommand("demo", "Watch a simulated approach and docking, no camera needed");
-  const auto options = std::make_shared<Options>();
-  command->add_option("--scenario", options->scenario, "scenario file [approach.toml]")->type_name("FILE");
-  command->add_option("--out", options->out, "folder for the log and the pictures")
+  CLI::App* command = app.add_subcommand("demo", "Watch a simulated flight from 6 m to the docked marker");
+  const auto options = std::make_shared<DemoCommand>();
+  options->flight.out = "berth-demo";
+  options->flight.frames = 120;
+  CLI::Option* frames = add_flight_options(*command, options->flight);
+  CLI::Option* scenario = command->add_option("--scenario", options->scenario, "markers alone, of a scenario file")
+                              ->type_name("FILE")
+                              ->excludes(frames);
+  command->add_option("--max-frames", options->max_frames, "end a scenario after so many frames, 0 for all")
+      ->type_name("N")
+      ->capture_default_str()
+      ->needs(scenario);
+  command->add_option("--out", options->flight.out, "folder for the log and the pictures")
       ->type_name("DIR")
       ->capture_default_str();
-  command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
-      ->type_name("N")
-      ->capture_default_str();
-  add_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
-    const std::string scenario = options->scenario.empty()
-                                     ? shared_file("scenarios/approach.toml", "name a scenario by --scenario")
-                                     : options->scenario;
-    const std::unique_ptr<Source> source = open_source("sim:" + scenario);
-    make_folder(options->out, "name another by --out");
-    const fs::path out(options->out);
-    options->stream.log = (out / "log.jsonl").string();
-    options->stream.svg = (out / "trajectory.svg").string();
-    options->stream.picture = (out / "markers.png").string();
-    console.out() << "scenario    " << scenario << '\n';
-    exit_code = run_stream(*source, options->stream, console).with_markers > 0 ? kOk : kNoResult;
+    exit_code = options->scenario.empty() ? show_flight(options->flight, console) : show_scenario(*options, console);
   });
 }
 

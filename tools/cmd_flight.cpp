@@ -13,12 +13,9 @@
 
 #include "berth/error.hpp"
 #include "commands.hpp"
-#include "engine.hpp"
-#include "film_strip.hpp"
 #include "flight_run.hpp"
-#include "flight_svg.hpp"
+#include "flight_show.hpp"
 #include "output_file.hpp"
-#include "shared_file.hpp"
 
 namespace berth::cli {
 namespace {
@@ -32,62 +29,11 @@ constexpr const char* kExamples = R"(Examples:
 
 A flight goes from 6 m to 0.15 m before the marker. All of it is a function of its seed.)";
 
-struct FlightCommand {
-  std::string network;
-  std::string out = "berth-flight";
-  EngineOptions engine;
-  std::uint64_t seed = 1;
-  int frames = 240;
+struct FlightCommand : FlightOptions {
   int count = 1;
   int jobs = 1;
   bool empty = false;
 };
-
-/// The pilot and its backend.
-struct Crew {
-  explicit Crew(const FlightCommand& command) : backend(std::move(open_chosen_backends(command.engine).backends[0])) {
-    const CameraModel camera = navset::Flight::camera();
-    pilot = std::make_unique<Pilot>(*backend, *backend, camera.width, camera.height, flight_pilot(command.network));
-  }
-  std::unique_ptr<Backend> backend;
-  std::unique_ptr<Pilot> pilot;
-};
-
-int fly_one(const FlightCommand& command, Console& console) {
-  Crew crew(command);
-  const navset::Flight flight(command.seed, command.frames);
-  console.out() << fmt::format("flight {}: {}; {} on {}\n", command.seed, flight.title(), crew.backend->name(),
-                               crew.backend->device().name);
-  FilmStrip strip(navset::Flight::camera(), navset::kTargetDiameter_m);
-  int index = 0;
-  const int last = command.frames - 1;
-  const auto part = [last](int frame) { return frame * 8 / last; };  // nine pictures
-  const auto watch = [&](const navset::FlightFrame& truth, const PilotFrame& found) {
-    const double range = sim::length(truth.target.t);
-    if (index == 0 || part(index) != part(index - 1)) {
-      strip.add(truth.image.view(), found, fmt::format("{:.2f} m  {}", range, name_of(found.mode)));
-    }
-    if (found.change[0] != '\0') {
-      console.out() << fmt::format("  frame {:>3}  {:.2f} m  {}: {}\n", index, range, name_of(found.mode),
-                                   found.change);
-    }
-    if (console.out_is_terminal()) {
-      console.out() << fmt::format("\r  {:3.0f} %  {}\x1b[K\r", 100.0 * index / last, name_of(found.mode))
-                    << std::flush;
-    }
-    ++index;
-  };
-  const FlightLog log = fly(flight, command.seed, *crew.pilot, watch);
-  const fs::path out(command.out);
-  write_file((out / "flight.svg").string(), "the drawing", flight_svg(log));
-  write_file((out / "flight.jsonl").string(), "the log", to_line(to_json(log)) + "\n");
-  strip.write((out / "flight.png").string(), 3);
-  console.out() << fmt::format("{}; longest gap {} frames, {} frames with something else for the target\n",
-                               log.docked() ? "docked" : "NOT docked", log.longest_gap(), log.wrong())
-                << fmt::format("drawing     {}\nframes      {}\nlog         {}\n", (out / "flight.svg").string(),
-                               (out / "flight.png").string(), (out / "flight.jsonl").string());
-  return log.docked() ? kOk : kNoResult;
-}
 
 /// The lines of earlier flights; one cut off in the middle does not count.
 std::vector<Json> read_lines(const fs::path& path) {
@@ -211,6 +157,7 @@ class Campaign {
 };
 
 int fly_many(const FlightCommand& command, Console& console) {
+  make_folder(command.out, "name another by --out");
   Campaign campaign(command, console);
   const std::vector<Json>& flights = campaign.run();
   console.out() << "log         " << campaign.path() << '\n';
@@ -229,26 +176,17 @@ int fly_many(const FlightCommand& command, Console& console) {
 void add_flight(CLI::App& app, Console& console, int& exit_code) {
   CLI::App* command = app.add_subcommand("flight", "Watch simulated flights from 6 m to the docked marker");
   const auto options = std::make_shared<FlightCommand>();
-  command->add_option("--network", options->network, "the network's file [the one that comes with Berth]")
-      ->type_name("FILE");
-  command->add_option("--seed", options->seed, "the flight, or the first of many")
-      ->type_name("N")
-      ->capture_default_str();
-  command->add_option("--frames", options->frames, "frames of a flight")
-      ->check(CLI::Range(5, 100000))
-      ->capture_default_str();
+  options->out = "berth-flight";
+  add_flight_options(*command, *options);
   command->add_option("--count", options->count, "flights; more than one write a line each and no pictures")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command->add_option("--jobs", options->jobs, "flights at a time")->check(CLI::Range(1, 256))->capture_default_str();
   command->add_flag("--empty", options->empty, "without the target: how often something else is taken for it");
   command->add_option("--out", options->out, "folder for logs and pictures")->type_name("DIR")->capture_default_str();
-  add_backend_options(*command, options->engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
-    if (options->network.empty()) options->network = shared_file("models/lite.berthnet", "name a network by --network");
-    make_folder(options->out, "name another by --out");
-    exit_code = options->count == 1 && !options->empty ? fly_one(*options, console) : fly_many(*options, console);
+    exit_code = options->count == 1 && !options->empty ? show_flight(*options, console) : fly_many(*options, console);
   });
 }
 

@@ -79,7 +79,7 @@ FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const Flight
     stamp.sequence = static_cast<u64>(i);
     const PilotFrame& found = pilot.look(frame.image.view(), stamp);
     log.points.push_back(point_of(i, frame, found));
-    if (seen) seen(frame, found);
+    if (seen) seen(log.points.back(), frame, found);
   }
   return log;
 }

@@ -45,7 +45,7 @@ struct FlightLog {
 PilotConfig flight_pilot(const std::string& network);
 
 /// Flies with a new pilot. `seen` is called after every frame.
-using FlightWatcher = std::function<void(const navset::FlightFrame&, const PilotFrame&)>;
+using FlightWatcher = std::function<void(const FlightPoint&, const navset::FlightFrame&, const PilotFrame&)>;
 FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const FlightWatcher& seen = {});
 
 /// Seed, title, docked, first frames, longest gap, wrong frames, sightings, every change of mode with its

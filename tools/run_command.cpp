@@ -10,7 +10,7 @@ namespace berth::cli {
 namespace {
 
 constexpr const char* kExamples = R"(Examples:
-  berth demo                                     a simulated approach, start to docked
+  berth demo                                     a simulated flight, first sight to docked
   berth detect photo.jpg                         the markers in a photo, as a table
   berth detect --json --family tag36h11 photos/  the same for a folder, as JSON lines
   berth flight                                   from 6 m to the docked marker, with the network

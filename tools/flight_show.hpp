@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "berth/pilot.hpp"
+#include "commands.hpp"
+#include "engine.hpp"
+
+namespace berth::cli {
+
+/// A simulated flight, and who flies it.
+struct FlightOptions {
+  std::string network;  ///< a file; empty for the one that comes with Berth
+  std::string out;      ///< folder for drawing, frames and log
+  EngineOptions engine;
+  std::uint64_t seed = 1;
+  int frames = 240;
+};
+
+/// Adds --network, --seed, --frames and the backend's options. Returns --frames.
+CLI::Option* add_flight_options(CLI::App& command, FlightOptions& options);
+
+/// A pilot for simulated flights and the backend it runs on. Throws Error.
+struct Crew {
+  explicit Crew(const FlightOptions& options);
+  std::unique_ptr<Backend> backend;
+  std::unique_ptr<Pilot> pilot;
+};
+
+/// Flies once, with a table as it goes; writes flight.svg, flight.png and flight.jsonl. Returns the exit code.
+int show_flight(const FlightOptions& options, Console& console);
+
+}  // namespace berth::cli
