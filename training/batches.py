@@ -28,12 +28,19 @@ def normalised(images):
     return out
 
 
-def training_batch(seed, iteration, count):
+def training_batch(seed, iteration, count, size=BATCH):
     """Indices (of `count`) of batch `iteration`: each epoch a permutation, its last batch filled from its start."""
-    per_epoch = (count + BATCH - 1) // BATCH
+    per_epoch = (count + size - 1) // size
     epoch, k = divmod(iteration, per_epoch)
     order = np.random.default_rng([seed, 1, epoch]).permutation(count)
-    return order[np.arange(k * BATCH, (k + 1) * BATCH) % count]
+    return order[np.arange(k * size, (k + 1) * size) % count]
+
+
+def balanced_batch(seed, iteration, present):
+    """As training_batch, half of it targets: they are fewer, and more is to be learnt from them."""
+    halves = [np.flatnonzero(present == kind) for kind in (0, 1)]
+    return np.concatenate([half[training_batch([seed, k], iteration, len(half), BATCH // 2)]
+                           for k, half in enumerate(halves)])
 
 
 def shifted(image, dx, dy):

@@ -77,7 +77,8 @@ class Network(nn.Module):
     """u8-like input float[n, 1, 256, 256], mean already taken off and scaled; returns scores float[n, 2] (absent,
     present) and geometry float[n, 3]: (x - 127.5) / 128, (y - 127.5) / 128, ln(d / 64 px).
 
-    With `batch_norm` each convolution is followed by batch normalisation, which makes training fast; `folded` takes it
+    Training passes leave local response normalisation out: behind batch normalisation it changes activations by less
+    than a hundredth, and takes a fifth of the time. With `batch_norm` each convolution is followed by batch normalisation, which makes training fast; `folded` takes it
     out again, exactly up to rounding, so that the network that is shipped has the paper's layers alone."""
 
     def __init__(self, name, batch_norm=True):
@@ -111,7 +112,9 @@ class Network(nn.Module):
 
     def forward(self, x, dropout=0.0):
         for spec, conv, norm in zip(self.specs, self.convs, self.norms):
-            x = self.lrn(F.relu(norm(conv(x))))
+            x = F.relu(norm(conv(x)))
+            if not self.training:
+                x = self.lrn(x)
             if spec.pool:
                 x = F.max_pool2d(x, 3, 2)
         x = x.flatten(1)  # channels, rows, columns

@@ -16,8 +16,9 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from batches import BATCH, Samples, augmented, normalised, training_batch
+from batches import BATCH, Samples, augmented, balanced_batch, normalised, training_batch
 from model import SIZE_UNIT_PX, Network, size_of
+from muon import Optimizer
 from navset import NavSet
 
 LOG = ["iteration", "epoch", "learning_rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy", "misses",
@@ -30,9 +31,13 @@ class Trainer:
         self.settings, self.train, self.test, self.device = settings, train, test, device
         torch.manual_seed(settings["seed"])
         self.network = Network(settings["network"]).to(device, memory_format=torch.channels_last)
-        self.optimizer = torch.optim.AdamW(self.network.parameters(), lr=settings["learning_rate"],
-                                           weight_decay=settings["weight_decay"])
+        outputs = [self.network.score, self.network.geometry]
+        self.optimizer = Optimizer(self.network, outputs, settings["learning_rate"], settings["weight_decay"])
         self.mean = 0.0 if settings["normalise"] else train.mean()
+        # Targets are more frequent in balanced batches than in the set by so much; what is learnt beside it is the score
+        # for the set's share (logit adjustment, Menon et al., 2021, arXiv:2007.07314).
+        share = train.present.mean() if settings["balance"] else 0.5
+        self.odds = torch.tensor([math.log(0.5 / (1 - share)), math.log(0.5 / share)], device=device)
         self.iteration = 0
 
     def tensor(self, images):
@@ -59,21 +64,22 @@ class Trainer:
     def step(self):
         """One batch; returns its loss and accuracy."""
         s, data = self.settings, self.train
-        chosen = training_batch(s["seed"], self.iteration, len(data))
+        if s["balance"]:
+            chosen = balanced_batch(s["seed"], self.iteration, data.present)
+        else:
+            chosen = training_batch(s["seed"], self.iteration, len(data))
         images, x, y, d = data.images(chosen), data.x[chosen], data.y[chosen], data.d[chosen]
         if s["augment"]:
             images, x, y, d = augmented(s["seed"], self.iteration, images, x, y, d)
         present, x, y, d = (torch.from_numpy(a).to(self.device) for a in (data.present[chosen], x, y, d))
-        for group in self.optimizer.param_groups:
-            group["lr"] = self.learning_rate()
         self.network.train()
         torch.manual_seed(s["seed"] * 1_000_003 + self.iteration)  # dropout's only source
         scores, geometry = self.outputs(self.tensor(images), s["dropout"])
+        scores = scores + self.odds
         class_loss, geometry_loss = self.losses(scores, geometry, present, x, y, d)
-        self.optimizer.zero_grad()
         (class_loss + 0.25 * geometry_loss).backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
-        self.optimizer.step()
+        self.optimizer.step(self.learning_rate())
         self.iteration += 1
         return class_loss.item(), (scores.argmax(1) == present.long()).float().mean().item()
 
@@ -106,13 +112,39 @@ class Trainer:
 
     def start_from(self, state):
         """Takes over the convolutions of a pretrain.py run; the fully connected layers stay as they are."""
-        kept = {k: v for k, v in state["network"].items() if k.startswith(("convs.", "norms."))}
+        names = {name.replace("network.", "", 1): name for name in state["network"]}
+        kept = {k: state["network"][name] for k, name in names.items() if k.startswith(("convs.", "norms."))}
         self.network.load_state_dict(kept, strict=False)
 
     def restore(self, state):
         self.network.load_state_dict(state["network"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.iteration, self.mean = state["iteration"], state["mean"]
+
+
+def settings_of(folder, make):
+    """Of the run in `folder`; those of make() if it is a new one, kept in run.json."""
+    file = folder / "run.json"
+    if file.exists():
+        return json.loads(file.read_text())
+    settings = make()
+    folder.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(settings, indent=2) + "\n")
+    return settings
+
+
+def make_repeatable(threads):
+    """The same sums in the same order in every run, on a GPU too."""
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    torch.utils.deterministic.fill_uninitialized_memory = False  # a debugging aid that costs a tenth of the time
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+
+
+def latest(folder, device):
+    """The state that a run was left in, or None."""
+    file = folder / "latest.pt"
+    return torch.load(file, map_location=device, weights_only=True) if file.exists() else None
 
 
 def save(state, path):
@@ -170,9 +202,10 @@ def main():
     parser.add_argument("--iterations", type=int, default=30000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--start", metavar="RUN", help="a run of pretrain.py whose convolutions to begin with")
-    parser.add_argument("--learning-rate", type=float, default=1e-3)
+    parser.add_argument("--learning-rate", type=float, default=1e-2)
     parser.add_argument("--weight-decay", type=float, default=0.02)
     parser.add_argument("--dropout", type=float, default=0.0, help="in the fully connected layers")
+    parser.add_argument("--balance", action="store_true", help="half of each batch targets; scores for the set's share")
     parser.add_argument("--augment", action="store_true", help="turn, mirror, shift, brighten")
     parser.add_argument("--normalise", action="store_true", help="contrast normalisation in place of the training mean")
     parser.add_argument("--precision", choices=["fp32", "bf16"], default="fp32")
@@ -181,34 +214,29 @@ def main():
     parser.add_argument("--until", type=int, help="stop at this iteration, to be resumed")
     arguments = parser.parse_args()
     folder = pathlib.Path(arguments.run)
-    settings_file = folder / "run.json"
-    if settings_file.exists():
-        settings = json.loads(settings_file.read_text())
-    else:
+
+    def new_settings():
         if not arguments.train:
             parser.error("a new run needs --train")
-        names = ["network", "iterations", "seed", "learning_rate", "weight_decay", "dropout", "augment", "normalise",
-                 "precision"]
+        names = ["network", "iterations", "seed", "learning_rate", "weight_decay", "dropout", "balance", "augment",
+                 "normalise", "precision"]
         settings = {name: getattr(arguments, name) for name in names}
         settings["train"] = [os.path.abspath(path) for path in arguments.train]
         settings["test"] = os.path.abspath(arguments.test or arguments.train[0])
         settings["start"] = arguments.start and os.path.abspath(arguments.start)
         settings["manifests"] = [NavSet(path).manifest for path in [*settings["train"], settings["test"]]]
-        folder.mkdir(parents=True, exist_ok=True)
-        settings_file.write_text(json.dumps(settings, indent=2) + "\n")
-    torch.set_num_threads(arguments.threads)
-    torch.use_deterministic_algorithms(True)
-    torch.utils.deterministic.fill_uninitialized_memory = False  # a debugging aid that costs a tenth of the time
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+        return settings
+
+    settings = settings_of(folder, new_settings)
+    make_repeatable(arguments.threads)
     device = arguments.device if arguments.device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
     train = Samples([NavSet(path) for path in settings["train"]], "train")
     test = Samples([NavSet(settings["test"])], "test")
     trainer = Trainer(settings, train, test, device)
-    if (folder / "latest.pt").exists():
-        trainer.restore(torch.load(folder / "latest.pt", map_location=device, weights_only=True))
+    if state := latest(folder, device):
+        trainer.restore(state)
     elif settings.get("start"):
-        start = pathlib.Path(settings["start"]) / "latest.pt"
-        trainer.start_from(torch.load(start, map_location=device, weights_only=True))
+        trainer.start_from(latest(pathlib.Path(settings["start"]), device))
     parameters, macs = size_of(trainer.network)
     print(f"{settings['network']}: {parameters / 1e6:.2f} M parameters, {macs / 1e6:.0f} MMAC; {len(train)} training and "
           f"{len(test)} test images; {device}, {arguments.threads} threads; from iteration {trainer.iteration}", flush=True)

@@ -13,6 +13,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import curves  # noqa: E402
 from batches import BATCH, Samples, augmented, normalised, shifted, training_batch  # noqa: E402
 from model import LocalResponseNorm, Network, size_of  # noqa: E402
+from muon import LARGEST, Muon, Optimizer, orthogonalised  # noqa: E402
 from navset import NavSet  # noqa: E402
 from pretrain import CropNetwork, Pretrainer, crops, place_loss  # noqa: E402
 from train import LOG, Trainer, run  # noqa: E402
@@ -38,7 +39,38 @@ def small_set(folder, count=120):
     return NavSet(folder)
 
 
-SETTINGS = {"network": "lite", "seed": 5, "learning_rate": 1e-3, "weight_decay": 0.02, "dropout": 0.2, "augment": True,
+class Optimizers(unittest.TestCase):
+    def test_muon_makes_all_singular_values_about_one(self):
+        torch.manual_seed(2)
+        for rows, columns in ((32, 64), (96, 576), (50, 20)):
+            skewed = torch.randn(rows, columns) * torch.logspace(0, -1.5, columns)
+            values = torch.linalg.svdvals(orthogonalised(skewed))
+            self.assertGreater(values.min(), 0.3, (rows, columns))
+            self.assertLess(values.max(), 1.3, (rows, columns))
+
+    def test_muon_comes_to_a_least_squares_solution(self):
+        torch.manual_seed(3)
+        wanted, weight = torch.randn(8, 12), torch.nn.Parameter(torch.zeros(8, 12))
+        muon = Muon([weight], 0.1, 0.0)
+        for k in range(300):
+            muon.param_groups[0]["lr"] = 0.1 * (1 - k / 300)
+            weight.grad = weight.detach() - wanted
+            muon.step()
+        self.assertLess((weight - wanted).abs().max(), 0.05)
+
+    def test_each_parameter_has_one_optimizer(self):
+        for name in ("lite", "paper"):
+            network = Network(name)
+            optimizer = Optimizer(network, [network.score, network.geometry], 1e-2, 0.0)
+            muon = [p for group in optimizer.muon.param_groups for p in group["params"]]
+            adamw = [p for group in optimizer.adamw.param_groups for p in group["params"]]
+            self.assertEqual({id(p) for p in muon + adamw}, {id(p) for p in network.parameters()})
+            self.assertEqual(len(muon) + len(adamw), len(list(network.parameters())))
+            self.assertTrue(all(p.ndim > 1 and min(p.flatten(1).shape) <= LARGEST for p in muon))
+            self.assertEqual(len(muon), 7 if name == "lite" else 5)
+
+
+SETTINGS = {"network": "lite", "seed": 5, "learning_rate": 1e-2, "weight_decay": 0.02, "dropout": 0.2, "balance": False, "augment": True,
             "normalise": True, "precision": "fp32", "iterations": 20}
 
 
