@@ -65,6 +65,19 @@ class SimulatedNetwork(nn.Module):
         return x[:, :2], x[:, 2:]
 
 
+class Plain:
+    """AdamW alone: small steps from where Muon went."""
+
+    def __init__(self, parameters):
+        self.adamw = torch.optim.AdamW(parameters, weight_decay=0.0)
+
+    def step(self, learning_rate):
+        for group in self.adamw.param_groups:
+            group["lr"] = learning_rate
+        self.adamw.step()
+        self.adamw.zero_grad()
+
+
 class FineTuner(Trainer):
     """Trains a SimulatedNetwork as train.py trains a Network: the same loss, batches of another seed."""
 
@@ -72,7 +85,7 @@ class FineTuner(Trainer):
         super().__init__({**settings, "seed": settings["seed"] + 1000, "iterations": iterations, "precision": "fp32",
                           "learning_rate": learning_rate}, train, train, device)
         self.network, self.mean = simulated.to(device), mean
-        self.optimizer = torch.optim.AdamW(simulated.parameters(), lr=learning_rate, weight_decay=0.0)
+        self.optimizer = Plain(simulated.parameters())
 
     def tune(self, progress=None):
         """Mean loss of the first and of the last tenth of the iterations."""

@@ -77,9 +77,10 @@ class Network(nn.Module):
     """u8-like input float[n, 1, 256, 256], mean already taken off and scaled; returns scores float[n, 2] (absent,
     present) and geometry float[n, 3]: (x - 127.5) / 128, (y - 127.5) / 128, ln(d / 64 px).
 
-    Training passes leave local response normalisation out: behind batch normalisation it changes activations by less
-    than a hundredth, and takes a fifth of the time. With `batch_norm` each convolution is followed by batch normalisation, which makes training fast; `folded` takes it
-    out again, exactly up to rounding, so that the network that is shipped has the paper's layers alone."""
+    Training passes leave local response normalisation out: behind batch normalisation it changes next to nothing, and
+    takes a fifth of the time. With `batch_norm` each convolution is followed by batch normalisation, which makes
+    training fast; `folded` takes it out again, exactly up to rounding, so that the network that is shipped has the
+    paper's layers alone."""
 
     def __init__(self, name, batch_norm=True):
         super().__init__()

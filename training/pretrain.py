@@ -202,6 +202,7 @@ def main():
             parser.error("a new run needs --train")
         settings = {name: getattr(arguments, name) for name in ("network", "iterations", "seed", "learning_rate")}
         settings["train"] = [os.path.abspath(path) for path in arguments.train]
+        settings["manifests"] = [NavSet(path).manifest for path in settings["train"]]
         return settings
 
     settings = settings_of(folder, new_settings)

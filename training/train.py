@@ -36,7 +36,7 @@ class Trainer:
         self.mean = 0.0 if settings["normalise"] else train.mean()
         # Targets are more frequent in balanced batches than in the set by so much; what is learnt beside it is the score
         # for the set's share (logit adjustment, Menon et al., 2021, arXiv:2007.07314).
-        share = train.present.mean() if settings["balance"] else 0.5
+        share = train.present.mean() if settings.get("balance") else 0.5
         self.odds = torch.tensor([math.log(0.5 / (1 - share)), math.log(0.5 / share)], device=device)
         self.iteration = 0
 
@@ -64,7 +64,7 @@ class Trainer:
     def step(self):
         """One batch; returns its loss and accuracy."""
         s, data = self.settings, self.train
-        if s["balance"]:
+        if s.get("balance"):
             chosen = balanced_batch(s["seed"], self.iteration, data.present)
         else:
             chosen = training_batch(s["seed"], self.iteration, len(data))
@@ -111,9 +111,13 @@ class Trainer:
                 "optimizer": self.optimizer.state_dict(), "settings": self.settings}
 
     def start_from(self, state):
-        """Takes over the convolutions of a pretrain.py run; the fully connected layers stay as they are."""
-        names = {name.replace("network.", "", 1): name for name in state["network"]}
-        kept = {k: state["network"][name] for k, name in names.items() if k.startswith(("convs.", "norms."))}
+        """Takes over the weights of a train.py run, or the convolutions of a pretrain.py run."""
+        weights = state["network"]
+        if not any(name.startswith("network.") for name in weights):
+            self.network.load_state_dict(weights)
+            return
+        names = {name.replace("network.", "", 1): name for name in weights}
+        kept = {k: weights[name] for k, name in names.items() if k.startswith(("convs.", "norms."))}
         self.network.load_state_dict(kept, strict=False)
 
     def restore(self, state):
@@ -122,9 +126,13 @@ class Trainer:
         self.iteration, self.mean = state["iteration"], state["mean"]
 
 
+def settings_file(folder):
+    return folder / "run.json"
+
+
 def settings_of(folder, make):
     """Of the run in `folder`; those of make() if it is a new one, kept in run.json."""
-    file = folder / "run.json"
+    file = settings_file(folder)
     if file.exists():
         return json.loads(file.read_text())
     settings = make()
@@ -201,7 +209,7 @@ def main():
     parser.add_argument("--test", metavar="SET", help="the set whose test part to use (default: the first --train)")
     parser.add_argument("--iterations", type=int, default=30000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--start", metavar="RUN", help="a run of pretrain.py whose convolutions to begin with")
+    parser.add_argument("--start", metavar="RUN", help="a run to begin with: of pretrain.py, its convolutions; of train.py, all")
     parser.add_argument("--learning-rate", type=float, default=1e-2)
     parser.add_argument("--weight-decay", type=float, default=0.02)
     parser.add_argument("--dropout", type=float, default=0.0, help="in the fully connected layers")
@@ -236,7 +244,11 @@ def main():
     if state := latest(folder, device):
         trainer.restore(state)
     elif settings.get("start"):
-        trainer.start_from(latest(pathlib.Path(settings["start"]), device))
+        start = latest(pathlib.Path(settings["start"]), device)
+        if start is None:
+            raise SystemExit(f"train.py: {settings['start']} has no latest.pt: name a run of pretrain.py or train.py by --start, and "
+                             f"remove {settings_file(folder)}, which remembers this one")
+        trainer.start_from(start)
     parameters, macs = size_of(trainer.network)
     print(f"{settings['network']}: {parameters / 1e6:.2f} M parameters, {macs / 1e6:.0f} MMAC; {len(train)} training and "
           f"{len(test)} test images; {device}, {arguments.threads} threads; from iteration {trainer.iteration}", flush=True)

@@ -11,7 +11,8 @@ import torch
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import curves  # noqa: E402
-from batches import BATCH, Samples, augmented, normalised, shifted, training_batch  # noqa: E402
+from batches import BATCH, Samples, augmented, balanced_batch, normalised, shifted, training_batch  # noqa: E402
+from fine_tune import FineTuner  # noqa: E402
 from model import LocalResponseNorm, Network, size_of  # noqa: E402
 from muon import LARGEST, Muon, Optimizer, orthogonalised  # noqa: E402
 from navset import NavSet  # noqa: E402
@@ -37,6 +38,41 @@ def small_set(folder, count=120):
     (folder / "labels.csv").write_text("\n".join(lines) + "\n")
     (folder / "manifest.json").write_text(json.dumps({"set": "small"}))
     return NavSet(folder)
+
+
+class Balance(unittest.TestCase):
+    def test_half_of_a_batch_is_targets_and_epochs_are_permutations(self):
+        present = (np.arange(400) % 4 == 0).astype(np.float32)
+        seen = []
+        for k in range(4):
+            chosen = balanced_batch(7, k, present)
+            self.assertEqual(len(chosen), BATCH)
+            self.assertEqual(present[chosen].sum(), BATCH // 2)
+            np.testing.assert_array_equal(chosen, balanced_batch(7, k, present))
+            seen += list(chosen[present[chosen] > 0])
+        self.assertEqual(len(set(seen)), 100)  # 4 x 25 of the 100 targets
+
+    def test_scores_are_for_the_sets_share(self):
+        with tempfile.TemporaryDirectory() as folder:
+            samples = Samples([small_set(pathlib.Path(folder))], "train")
+            samples.present[:] = np.arange(len(samples)) % 4 == 0
+            trainer = Trainer({**SETTINGS, "balance": True}, samples, samples, "cpu")
+        prior = torch.log(torch.tensor([1 - samples.present.mean(), samples.present.mean()]))
+        torch.testing.assert_close(torch.softmax(prior + trainer.odds, 0), torch.tensor([0.5, 0.5]))
+
+
+class FineTuning(unittest.TestCase):
+    def test_steps_with_an_optimizer_of_its_own(self):
+        with tempfile.TemporaryDirectory() as folder:
+            samples = Samples([small_set(pathlib.Path(folder))], "train")
+            network = Network("lite")
+            before = network.convs[2].weight.detach().clone()
+            tuner = FineTuner(network, SETTINGS, 0.0, samples, 2, 1e-3, "cpu")
+            first, last = tuner.tune()
+        self.assertTrue(np.isfinite(first) and np.isfinite(last))
+        self.assertEqual(tuner.iteration, 2)
+        change = (network.convs[2].weight - before).abs().max().item()
+        self.assertTrue(0 < change < 0.01, change)  # AdamW's steps of the learning rate, not Muon's
 
 
 class Optimizers(unittest.TestCase):
@@ -70,8 +106,8 @@ class Optimizers(unittest.TestCase):
             self.assertEqual(len(muon), 7 if name == "lite" else 5)
 
 
-SETTINGS = {"network": "lite", "seed": 5, "learning_rate": 1e-2, "weight_decay": 0.02, "dropout": 0.2, "balance": False, "augment": True,
-            "normalise": True, "precision": "fp32", "iterations": 20}
+SETTINGS = {"network": "lite", "seed": 5, "learning_rate": 1e-2, "weight_decay": 0.02, "dropout": 0.2, "balance": False,
+            "augment": True, "normalise": True, "precision": "fp32", "iterations": 20}
 
 
 class Networks(unittest.TestCase):
