@@ -48,10 +48,12 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
   const auto options = std::make_shared<DemoCommand>();
   options->flight.out = "berth-demo";
   options->flight.frames = 120;
-  CLI::Option* frames = add_flight_options(*command, options->flight);
+  const FlightOnly flight = add_flight_options(*command, options->flight);
   CLI::Option* scenario = command->add_option("--scenario", options->scenario, "markers alone, of a scenario file")
                               ->type_name("FILE")
-                              ->excludes(frames);
+                              ->excludes(flight.network)
+                              ->excludes(flight.seed)
+                              ->excludes(flight.frames);
   command->add_option("--max-frames", options->max_frames, "end a scenario after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str()

@@ -47,9 +47,8 @@ class FlightTable {
     if (!p.has_position) return begin + "-";
     const std::string range = p.from_marker ? fmt::format("{:.3f}", p.range_m)
                                             : fmt::format("{:.2f} ± {:.2f}", p.range_m, p.range_deviation_m);
-    const int width = p.from_marker ? 16 : 17;  // of bytes: ± has two
-    return begin + fmt::format("{:<11}  {:<{}}  {:.1f} % of d", p.from_marker ? "marker" : "network", range, width,
-                               100 * p.off);
+    return begin +
+           fmt::format("{:<11}  {:<16}  {:.1f} % of d", p.from_marker ? "marker" : "network", range, 100 * p.off);
   }
 
   int last_;
@@ -58,14 +57,19 @@ class FlightTable {
 
 }  // namespace
 
-CLI::Option* add_flight_options(CLI::App& command, FlightOptions& options) {
-  command.add_option("--network", options.network, "the network's file [the one that comes with Berth]")
-      ->type_name("FILE");
-  command.add_option("--seed", options.seed, "the flight, or the first of many")->type_name("N")->capture_default_str();
+FlightOnly add_flight_options(CLI::App& command, FlightOptions& options) {
+  FlightOnly added{};
+  added.network =
+      command.add_option("--network", options.network, "the network's file [the one that comes with Berth]")
+          ->type_name("FILE");
+  added.seed = command.add_option("--seed", options.seed, "the flight, or the first of many")
+                   ->type_name("N")
+                   ->capture_default_str();
+  added.frames = command.add_option("--frames", options.frames, "frames of a flight")
+                     ->check(CLI::Range(5, 100000))
+                     ->capture_default_str();
   add_backend_options(command, options.engine);
-  return command.add_option("--frames", options.frames, "frames of a flight")
-      ->check(CLI::Range(5, 100000))
-      ->capture_default_str();
+  return added;
 }
 
 Crew::Crew(const FlightOptions& options) : backend(std::move(open_chosen_backends(options.engine).backends[0])) {

@@ -19,8 +19,15 @@ struct FlightOptions {
   int frames = 240;
 };
 
-/// Adds --network, --seed, --frames and the backend's options. Returns --frames.
-CLI::Option* add_flight_options(CLI::App& command, FlightOptions& options);
+/// Options that only a flight has.
+struct FlightOnly {
+  CLI::Option* network;
+  CLI::Option* seed;
+  CLI::Option* frames;
+};
+
+/// Adds these and the backend's.
+FlightOnly add_flight_options(CLI::App& command, FlightOptions& options);
 
 /// A pilot for simulated flights and the backend it runs on. Throws Error.
 struct Crew {
