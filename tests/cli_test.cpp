@@ -86,6 +86,15 @@ TEST(Detect, PoseNeedsCameraAndSize) {
   EXPECT_EQ(pose["R"].size(), 9u);
   ASSERT_EQ(pose["t"].size(), 3u);
   EXPECT_GT(pose["t"][2], 0);
+  EXPECT_EQ(pose["covariance"].size(), 36u);
+  EXPECT_GT(pose["covariance"][14].get<double>(), 0);  // of the range
+  EXPECT_GT(pose["error_px"].get<double>(), 0.5);      // this camera did not take the image, and it shows
+  EXPECT_LE(pose["ambiguity"].get<double>(), 1);
+  const CommandRun paper =
+      run_berth({"detect", "--json", "--camera", camera, "--size", "0.1", "--pose", "paper", kImage});
+  const json closed = paper.lines().at(0)["detections"][0]["pose"];
+  EXPECT_FALSE(closed.contains("covariance"));
+  EXPECT_NEAR(closed["t"][2].get<double>(), pose["t"][2].get<double>(), 0.1 * pose["t"][2].get<double>());
   const CommandRun twice = run_berth({"detect", "--json", "--camera", camera, "--size", "0.2", kImage});
   EXPECT_NEAR(twice.lines().at(0)["detections"][0]["pose"]["t"][2].get<double>(), 2 * pose["t"][2].get<double>(), 1e-9);
   for (const std::vector<std::string>& half : {std::vector<std::string>{"--camera", camera}, {"--size", "0.1"}}) {

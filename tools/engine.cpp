@@ -54,6 +54,9 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
   command.add_option("--camera", options.camera_file, "camera_info YAML; with --size, markers get a pose")
       ->type_name("FILE");
   command.add_option("--size", options.size, "side of the marker's border square, metres")->type_name("METRES");
+  command.add_option("--pose", options.pose, "how poses are had: least-squares, or the paper's closed form")
+      ->check(CLI::IsMember({"least-squares", "paper"}))
+      ->capture_default_str();
   command.add_option("--max-hamming", options.max_hamming, "most wrong bits a code may have")
       ->type_name("N")
       ->capture_default_str();
@@ -165,6 +168,7 @@ DetectorConfig make_config(const EngineOptions& options) {
   }
   config.max_hamming = options.max_hamming;
   if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
+  if (options.pose == "paper") config.pose_method = PoseMethod::paper;
   if (!options.camera_file.empty()) config.camera = read_camera_info(options.camera_file);
   return config;
 }

@@ -17,6 +17,7 @@ struct EngineOptions {
   std::vector<std::string> families;
   std::string camera_file;
   std::string size;
+  std::string pose = "least-squares";
   std::string backend;
   std::string device;
   int threads = 1;

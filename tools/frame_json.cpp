@@ -7,12 +7,23 @@ namespace {
 
 Json to_json(const Pose& pose) { return {{"R", pose.R}, {"t", pose.t}}; }
 
+void add_uncertainty(const PoseUncertainty& uncertainty, Json& pose) {
+  pose["covariance"] = uncertainty.covariance;
+  pose["error_px"] = uncertainty.error_px;
+  pose["ambiguity"] = uncertainty.ambiguity();
+  if (uncertainty.has_other) {
+    pose["other"] = to_json(uncertainty.other);
+    pose["other"]["error_px"] = uncertainty.other_error_px;
+  }
+}
+
 }  // namespace
 
 Json to_json(const Detection& detection) {
   Json json = {{"family", detection.family->name}, {"id", detection.id},           {"hamming", detection.hamming},
                {"margin", detection.margin},       {"corners", detection.corners}, {"center", detection.center}};
   if (detection.has_pose) json["pose"] = to_json(detection.pose);
+  if (detection.pose_uncertainty) add_uncertainty(*detection.pose_uncertainty, json["pose"]);
   return json;
 }
 

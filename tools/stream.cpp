@@ -151,7 +151,7 @@ class StreamRun {
       if (!detection.has_pose) continue;
       const TruthMarker* marker = truth_of(detection, truth);
       if (marker != nullptr) {
-        for (double& t : detection.pose.t) t *= marker->size_m / engine_->config().marker_size_m;
+        scale_pose(marker->size_m / engine_->config().marker_size_m, detection);
       } else if (!size_given_) {
         detection.has_pose = false;
       }

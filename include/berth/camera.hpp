@@ -16,6 +16,8 @@ struct CameraModel {
 
   /// Image point (px) of the point (x, y, 1) in the camera frame. Only + − × ÷: the same bits on every machine.
   std::array<double, 2> project(double x, double y) const;
+  /// The same, and its derivative: du/dx, du/dy, dv/dx, dv/dy.
+  std::array<double, 2> project(double x, double y, std::array<double, 4>& derivative) const;
   /// The inverse of project, by a fixed number of Newton steps; accurate to 1e-9 px where the lens is one-to-one.
   std::array<double, 2> undistort(double u_px, double v_px) const;
 };

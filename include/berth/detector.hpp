@@ -21,6 +21,14 @@ struct Capacities {
   int points = 0;
 };
 
+/// How a marker's pose is had from its corners (docs/pose.md).
+enum class PoseMethod {
+  /// Least squares of the corners' reprojection errors, from both poses that a plane may have.
+  least_squares,
+  /// The paper's closed form alone (section 4.1), without uncertainty: badly conditioned for small markers.
+  paper,
+};
+
 struct DetectorConfig {
   /// Family names; see family_names().
   std::vector<std::string> families = {"tag36h11"};
@@ -31,6 +39,9 @@ struct DetectorConfig {
   /// Camera and marker side (metres, the side the corners span); with both, detections get a pose.
   std::optional<CameraModel> camera;
   double marker_size_m = 0;
+  PoseMethod pose_method = PoseMethod::least_squares;
+  /// One standard deviation of a corner's coordinate, px: what poses' covariances go by (docs/pose.md).
+  double corner_deviation_px = 0.15;
   /// Per-pixel gain of the flat-field correction, row-major, 1 = unchanged; empty for none.
   std::vector<float> flat_field;
   Capacities capacities;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,21 @@ struct Pose {
   std::array<double, 3> t = {0, 0, 0};
 };
 
+/// How well a pose is known.
+struct PoseUncertainty {
+  /// Row-major 6 × 6: translation (m), then rotation (rad). The true pose is t + dt, rotation(w) · R: w turns about the
+  /// marker's origin, about axes parallel to the camera's.
+  std::array<double, 36> covariance = {};
+  /// Root mean square distance of the corners from where the pose says they are, px.
+  double error_px = 0;
+  /// A plane seen from far away fits nearly as well tilted the other way: that pose, and its error.
+  bool has_other = false;
+  Pose other;
+  double other_error_px = 0;
+  /// 0: no doubt which of the two it is; 1: the corners do not tell.
+  double ambiguity() const { return has_other && other_error_px > 0 ? error_px / other_error_px : has_other ? 1 : 0; }
+};
+
 /// A decoded marker. Corners in the paper's order: the upright marker's upper left first, then counter-clockwise
 /// (upper left, lower left, lower right, upper right); px, pixel centres at integer coordinates.
 struct Detection {
@@ -51,6 +67,11 @@ struct Detection {
   std::array<double, 2> center = {};
   bool has_pose = false;
   Pose pose;
+  /// Of poses by least squares.
+  std::optional<PoseUncertainty> pose_uncertainty;
 };
+
+/// Makes the pose that of a marker `factor` times as large, which gives the same image.
+void scale_pose(double factor, Detection& detection);
 
 }  // namespace berth

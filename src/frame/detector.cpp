@@ -12,7 +12,8 @@
 #include "frame/quads.hpp"
 #include "frame/stages.hpp"
 #include "target/decode.hpp"
-#include "target/pose.hpp"
+#include "target/marker_pose.hpp"
+#include "target/paper_p4p.hpp"
 
 namespace berth {
 
@@ -122,6 +123,9 @@ struct Detector::Impl {
     if (config.camera && !(config.marker_size_m > 0)) {
       throw Error("marker size is " + std::to_string(config.marker_size_m) + " m; give the side that the corners span");
     }
+    if (!(config.corner_deviation_px > 0)) {
+      throw Error("corner_deviation_px is " + std::to_string(config.corner_deviation_px) + "; give px above 0");
+    }
     if (plan.frame().host() == nullptr) staging.resize(plan.geometry().frame_bytes());
     std::size_t slots = 0;
     for (const MarkerSearch& search : plan.searches()) {
@@ -170,9 +174,7 @@ struct Detector::Impl {
     resolve_duplicates(result.detections);
     const Clock::time_point decoded = Clock::now();
     if (config.camera) {
-      for (Detection& detection : result.detections) {
-        detection.has_pose = paper_p4p(*config.camera, config.marker_size_m, detection.corners, detection.pose);
-      }
+      for (Detection& detection : result.detections) add_pose(detection);
     }
     const Clock::time_point posed = Clock::now();
     result.times = {StageTime{"device", ns_between(started, on_host)},
@@ -202,6 +204,18 @@ struct Detector::Impl {
         refused.push_back(candidate.fine);
       }
     }
+  }
+
+  void add_pose(Detection& d) const {
+    const CameraModel& camera = *config.camera;
+    d.pose_uncertainty.reset();
+    if (config.pose_method == PoseMethod::paper) {
+      d.has_pose = paper_p4p(camera, config.marker_size_m, d.corners, d.pose);
+      return;
+    }
+    d.has_pose = marker_pose(camera, config.marker_size_m, config.corner_deviation_px, d.corners, d.pose,
+                             d.pose_uncertainty.emplace());
+    if (!d.has_pose) d.pose_uncertainty.reset();
   }
 
   /// Whether these corners have been decoded or refused already: most quadrilaterals are found by several searches.

@@ -37,6 +37,12 @@ std::array<double, 2> CameraModel::project(double x, double y) const {
   return {fx * lens.x + cx, fy * lens.y + cy};
 }
 
+std::array<double, 2> CameraModel::project(double x, double y, std::array<double, 4>& derivative) const {
+  const Lens lens = distort(distortion, x, y);
+  derivative = {fx * lens.dx_dx, fx * lens.dx_dy, fy * lens.dy_dx, fy * lens.dy_dy};
+  return {fx * lens.x + cx, fy * lens.y + cy};
+}
+
 std::array<double, 2> CameraModel::undistort(double u_px, double v_px) const {
   const double target_x = (u_px - cx) / fx;
   const double target_y = (v_px - cy) / fy;

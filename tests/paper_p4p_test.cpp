@@ -1,6 +1,6 @@
 // paper_p4p against poses whose corners are computed exactly.
 
-#include "target/pose.hpp"
+#include "target/paper_p4p.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,20 +1,15 @@
-#include "target/pose.hpp"
+#include "target/paper_p4p.hpp"
 
 #include <cmath>
+
+#include "pose_algebra.hpp"
 
 namespace berth {
 namespace {
 
-using Vec3 = std::array<double, 3>;
-
 Vec3 operator+(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Vec3 operator*(double s, const Vec3& a) { return {s * a[0], s * a[1], s * a[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
 
 // Shorter than this (image distances at depth 1, cosines) a corner or an edge is no measurement.
 constexpr double kDegenerate = 1e-9;

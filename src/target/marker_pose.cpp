@@ -1,0 +1,74 @@
+#include "target/marker_pose.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "pose_algebra.hpp"
+#include "target/planar_pose.hpp"
+#include "target/refine_pose.hpp"
+
+namespace berth {
+namespace {
+
+// Two refinements that end this near are one: of each matrix element, and of a metre.
+constexpr double kSame = 1e-6;
+
+bool same(const Pose& a, const Pose& b) {
+  for (std::size_t i = 0; i < 9; ++i) {
+    if (std::fabs(a.R[i] - b.R[i]) > kSame) return false;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (std::fabs(a.t[i] - b.t[i]) > kSame) return false;
+  }
+  return true;
+}
+
+// The marker's z axis points away from who sees its front.
+bool shows_front(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0; }
+
+}  // namespace
+
+bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
+                 const std::array<std::array<double, 2>, 4>& corners_px, Pose& pose, PoseUncertainty& uncertainty) {
+  std::array<Pose, 2> starts;
+  const int count = planar_poses(camera, size_m, corners_px, starts);
+  const double h = size_m / 2, variance = deviation_px * deviation_px;
+  const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
+  std::array<PoseCorner, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    corners[i] = {{place[i][0], place[i][1], 0}, corners_px[i], {variance, 0, variance}};
+  }
+  std::array<RefinedPose, 2> refined;
+  std::size_t found = 0;
+  for (int k = 0; k < count; ++k) {
+    RefinedPose& result = refined[found];
+    if (refine_pose(camera, corners.data(), corners.size(), starts[static_cast<std::size_t>(k)], result) &&
+        shows_front(result.pose)) {
+      ++found;
+    }
+  }
+  if (found == 0) return false;
+  if (found == 2 && refined[1].error_px < refined[0].error_px) std::swap(refined[0], refined[1]);
+  pose = refined[0].pose;
+  uncertainty = {refined[0].covariance, refined[0].error_px, false, {}, 0};
+  if (found == 2 && !same(refined[0].pose, refined[1].pose)) {
+    uncertainty.has_other = true;
+    uncertainty.other = refined[1].pose;
+    uncertainty.other_error_px = refined[1].error_px;
+  }
+  return true;
+}
+
+void scale_pose(double factor, Detection& detection) {
+  detection.pose.t = scaled(detection.pose.t, factor);
+  if (!detection.pose_uncertainty) return;
+  PoseUncertainty& uncertainty = *detection.pose_uncertainty;
+  uncertainty.other.t = scaled(uncertainty.other.t, factor);
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) {
+      uncertainty.covariance[i * 6 + j] *= (i < 3 ? factor : 1) * (j < 3 ? factor : 1);
+    }
+  }
+}
+
+}  // namespace berth

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "berth/camera.hpp"
+#include "berth/marker.hpp"
+
+namespace berth {
+
+/// A known point of a target and where it was seen.
+struct PoseCorner {
+  std::array<double, 3> point_m = {};
+  std::array<double, 2> seen_px = {};
+  /// Of where it was seen, px^2: of u, of u with v, of v.
+  std::array<double, 3> covariance_px2 = {1, 0, 1};
+};
+
+/// A pose after refinement.
+struct RefinedPose {
+  Pose pose;
+  /// As PoseUncertainty's.
+  std::array<double, 36> covariance = {};
+  /// Root mean square distance of the corners from where the pose says they are, px.
+  double error_px = 0;
+  /// Sum of squares in standard deviations: chi-square with 2 count - 6 degrees of freedom where the model holds.
+  double chi_square = 0;
+};
+
+/// Least squares of the corners' reprojection errors, weighted by their covariances, from a pose nearby
+/// (Levenberg-Marquardt, rotations by Cayley's form). Returns false, and leaves `result` alone,
+/// where the start has a corner behind the camera, the corners do not determine the pose, or 20 steps do not come to an
+/// end. Needs three corners or more.
+bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
+                 RefinedPose& result);
+
+}  // namespace berth

@@ -1,0 +1,250 @@
+// Poses by least squares against poses whose corners are computed exactly, and their covariances against noise.
+
+#include "target/marker_pose.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "berth/camera.hpp"
+#include "sim/geometry.hpp"
+#include "sim/random.hpp"
+#include "target/planar_pose.hpp"
+#include "target/refine_pose.hpp"
+
+namespace berth {
+namespace {
+
+using Corners4 = std::array<std::array<double, 2>, 4>;
+constexpr double kSide_m = 0.08;
+
+Pose pose_of(double rx, double ry, double rz, const Vec3& t) { return {sim::rotation(rx, ry, rz), t}; }
+
+double between(sim::Random& random, double low, double high) { return random.uniform(low, high); }
+
+/// In front of the camera and seen from its front, tilted by up to `tilt` about x and y.
+Pose random_pose(sim::Random& random, double near_m, double far_m, double tilt) {
+  const double z = between(random, near_m, far_m);
+  const double rx = between(random, -tilt, tilt), ry = between(random, -tilt, tilt), rz = between(random, -3, 3);
+  const double x = between(random, -0.25, 0.25) * z, y = between(random, -0.2, 0.2) * z;
+  return pose_of(rx, ry, rz, {x, y, z});
+}
+
+Corners4 seen_corners(const CameraModel& camera, const Pose& pose, double side_m = kSide_m) {
+  const double h = side_m / 2;
+  const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
+  Corners4 corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vec3 at = transform(pose, {place[i][0], place[i][1], 0});
+    corners[i] = camera.project(at[0] / at[2], at[1] / at[2]);
+  }
+  return corners;
+}
+
+bool shows_front(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0.2 * length(pose.t); }
+
+/// Near enough normal: the sum of twelve uniform numbers.
+double normal(sim::Random& random) {
+  double sum = -6;
+  for (int k = 0; k < 12; ++k) sum += between(random, 0, 1);
+  return sum;
+}
+
+Corners4 with_noise(Corners4 corners, double deviation_px, sim::Random& random) {
+  for (auto& corner : corners) {
+    for (double& value : corner) value += deviation_px * normal(random);
+  }
+  return corners;
+}
+
+double difference(const Pose& a, const Pose& b) {
+  double worst = 0;
+  for (std::size_t i = 0; i < 9; ++i) worst = std::max(worst, std::fabs(a.R[i] - b.R[i]));
+  for (std::size_t i = 0; i < 3; ++i) worst = std::max(worst, std::fabs(a.t[i] - b.t[i]));
+  return worst;
+}
+
+/// Translation and rotation vector from `found` to `truth`, as the covariance has them.
+std::array<double, 6> error_of(const Pose& found, const Pose& truth) {
+  const Mat3 turn = product(truth.R, transposed(found.R));
+  return {truth.t[0] - found.t[0],   truth.t[1] - found.t[1],   truth.t[2] - found.t[2],
+          0.5 * (turn[7] - turn[5]), 0.5 * (turn[2] - turn[6]), 0.5 * (turn[3] - turn[1])};
+}
+
+/// e' C^-1 e by elimination.
+double mahalanobis(std::array<double, 36> c, std::array<double, 6> e) {
+  const std::array<double, 6> right = e;
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t i = k + 1; i < 6; ++i) {
+      const double factor = c[i * 6 + k] / c[k * 6 + k];
+      for (std::size_t j = k; j < 6; ++j) c[i * 6 + j] -= factor * c[k * 6 + j];
+      e[i] -= factor * e[k];
+    }
+  }
+  double sum = 0;
+  for (std::size_t i = 6; i-- > 0;) {
+    for (std::size_t j = i + 1; j < 6; ++j) e[i] -= c[i * 6 + j] * e[j];
+    e[i] /= c[i * 6 + i];
+    sum += e[i] * right[i];
+  }
+  return sum;
+}
+
+TEST(PlanarPoses, HaveTheTruthAmongThem) {
+  sim::Random random(1);
+  const CameraModel camera = paper_camera();
+  int poses = 0;
+  while (poses < 5000) {
+    const Pose truth = random_pose(random, 0.15, 2.5, 1.2);
+    if (!shows_front(truth)) continue;
+    ++poses;
+    std::array<Pose, 2> found;
+    const int count = planar_poses(camera, kSide_m, seen_corners(camera, truth), found);
+    ASSERT_GE(count, 1) << poses;
+    double nearest = difference(found[0], truth);
+    if (count == 2) nearest = std::min(nearest, difference(found[1], truth));
+    ASSERT_LT(nearest, 2e-5) << poses;  // square roots of differences near zero lose half of the digits
+  }
+}
+
+TEST(MarkerPose, RecoversPosesOfAllKinds) {
+  sim::Random random(2);
+  const CameraModel camera = paper_camera();
+  int poses = 0;
+  while (poses < 5000) {
+    const Pose truth = random_pose(random, 0.15, 2.5, 1.2);
+    if (!shows_front(truth)) continue;
+    ++poses;
+    Pose pose;
+    PoseUncertainty uncertainty;
+    ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, seen_corners(camera, truth), pose, uncertainty)) << poses;
+    ASSERT_LT(difference(pose, truth), 1e-7) << poses;
+    ASSERT_LT(uncertainty.error_px, 1e-6) << poses;
+  }
+}
+
+// Normalised estimation error squared: chi-square with six degrees of freedom, mean 6, its 95 % quantile 12.59.
+TEST(MarkerPose, ItsCovarianceIsThatOfItsErrors) {
+  sim::Random random(3);
+  const CameraModel camera = paper_camera();
+  constexpr int kFrames = 10000;
+  constexpr double kDeviation_px = 0.1;
+  double sum = 0;
+  int outside = 0, frames = 0;
+  std::array<double, 6> axis{};
+  while (frames < kFrames) {
+    // Near and tilted enough for the other pose of the plane to be out of question.
+    const Pose truth = random_pose(random, 0.15, 0.5, 0.9);
+    const double facing = dot(column(truth.R, 2), truth.t) / length(truth.t);
+    if (facing < 0.4 || facing > 0.94) continue;
+    ++frames;
+    Pose pose;
+    PoseUncertainty uncertainty;
+    const Corners4 corners = with_noise(seen_corners(camera, truth), kDeviation_px, random);
+    ASSERT_TRUE(marker_pose(camera, kSide_m, kDeviation_px, corners, pose, uncertainty));
+    const std::array<double, 6> error = error_of(pose, truth);
+    const double nees = mahalanobis(uncertainty.covariance, error);
+    sum += nees;
+    outside += nees > 12.592 ? 1 : 0;
+    for (std::size_t i = 0; i < 6; ++i) axis[i] += error[i] * error[i] / uncertainty.covariance[i * 7];
+  }
+  // Bounds of 95 %: the mean of N has a variance of 12 / N, an axis' of 2 / N, a share's of p (1 - p) / N.
+  EXPECT_NEAR(sum / kFrames, 6, 1.96 * std::sqrt(12.0 / kFrames));
+  EXPECT_NEAR(static_cast<double>(outside) / kFrames, 0.05, 1.96 * std::sqrt(0.05 * 0.95 / kFrames));
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(axis[i] / kFrames, 1, 2.64 * std::sqrt(2.0 / kFrames)) << i;
+}
+
+TEST(MarkerPose, SaysWhenTheCornersDoNotTellWhichPoseItIs) {
+  sim::Random random(4);
+  const CameraModel camera = paper_camera();
+  Pose pose;
+  PoseUncertainty uncertainty;
+  const Pose far = pose_of(0.15, 0.1, 0.4, {0.1, 0, 2});
+  ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, with_noise(seen_corners(camera, far), 0.1, random), pose, uncertainty));
+  EXPECT_TRUE(uncertainty.has_other);
+  EXPECT_GT(uncertainty.ambiguity(), 0.5);
+  const Pose near = pose_of(0.7, 0.1, 0.4, {0.02, 0, 0.25});
+  ASSERT_TRUE(
+      marker_pose(camera, kSide_m, 0.1, with_noise(seen_corners(camera, near), 0.1, random), pose, uncertainty));
+  EXPECT_LT(uncertainty.ambiguity(), 0.1);
+  EXPECT_LT(difference(pose, near), 0.01);
+}
+
+TEST(MarkerPose, ScalesWithTheMarker) {
+  sim::Random random(6);
+  const CameraModel camera = paper_camera();
+  const Corners4 corners = with_noise(seen_corners(camera, pose_of(0.5, 0.1, 0.4, {0.1, 0, 1})), 0.1, random);
+  Detection small;
+  Detection large;
+  ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, corners, small.pose, small.pose_uncertainty.emplace()));
+  ASSERT_TRUE(marker_pose(camera, 3 * kSide_m, 0.1, corners, large.pose, large.pose_uncertainty.emplace()));
+  scale_pose(3, small);
+  EXPECT_LT(difference(small.pose, large.pose), 1e-7);
+  ASSERT_TRUE(large.pose_uncertainty->has_other);
+  EXPECT_LT(difference(small.pose_uncertainty->other, large.pose_uncertainty->other), 1e-6);
+  for (std::size_t i = 0; i < 36; ++i) {
+    const double expected = large.pose_uncertainty->covariance[i];
+    const double scale =
+        std::sqrt(large.pose_uncertainty->covariance[i / 6 * 7] * large.pose_uncertainty->covariance[i % 6 * 7]);
+    EXPECT_NEAR(small.pose_uncertainty->covariance[i], expected, 1e-5 * scale) << i;
+  }
+  Detection without;
+  without.pose.t = {1, 2, 3};
+  scale_pose(2, without);
+  EXPECT_EQ(without.pose.t[2], 6);
+}
+
+TEST(MarkerPose, RefusesWhatIsNoMarker) {
+  const CameraModel camera = paper_camera();
+  Pose pose;
+  PoseUncertainty uncertainty;
+  const auto refused = [&](double size_m, const Corners4& corners) {
+    return !marker_pose(camera, size_m, 0.1, corners, pose, uncertainty);
+  };
+  const Corners4 square = {{{100, 100}, {100, 200}, {200, 200}, {200, 100}}};
+  ASSERT_FALSE(refused(0.1, square));
+  EXPECT_TRUE(refused(0, square));
+  EXPECT_TRUE(refused(-1, square));
+  EXPECT_TRUE(refused(std::numeric_limits<double>::quiet_NaN(), square));
+  EXPECT_TRUE(refused(0.1, {{{100, 100}, {200, 100}, {200, 200}, {100, 200}}}));  // clockwise
+  EXPECT_TRUE(refused(0.1, {{{100, 100}, {100, 100}, {100, 100}, {100, 100}}}));
+  EXPECT_TRUE(refused(0.1, {{{100, 100}, {110, 110}, {120, 120}, {130, 130}}}));
+  EXPECT_TRUE(refused(0.1, {{{100, 100}, {200, 200}, {100, 200}, {200, 100}}}));
+  Corners4 broken = square;
+  broken[2][1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(refused(0.1, broken));
+}
+
+TEST(RefinePose, WeighsCornersByTheirCovariance) {
+  sim::Random random(5);
+  const CameraModel camera = paper_camera();
+  const Pose truth = pose_of(0.4, -0.3, 0.2, {0.01, 0.02, 0.4});
+  std::vector<PoseCorner> corners;
+  for (int i = 0; i < 12; ++i) {
+    const Vec3 point = {between(random, -0.05, 0.05), between(random, -0.05, 0.05), between(random, -0.02, 0.02)};
+    const Vec3 at = transform(truth, point);
+    corners.push_back({point, camera.project(at[0] / at[2], at[1] / at[2]), {0.01, 0, 0.01}});
+  }
+  // A corner that is far off along a line, and says so, does no harm.
+  corners[3].seen_px[0] += 8;
+  corners[3].seen_px[1] += 8;
+  corners[3].covariance_px2 = {1e8, 0.99999999e8, 1e8};
+  RefinedPose refined;
+  const Pose start = pose_of(0.3, -0.2, 0.3, {0, 0, 0.5});
+  ASSERT_TRUE(refine_pose(camera, corners.data(), corners.size(), start, refined));
+  EXPECT_LT(difference(refined.pose, truth), 1e-6);
+  EXPECT_LT(refined.chi_square, 1e-3);
+  // Across that line it is far off in its own measure: (8, -8) is 8 sqrt(2) px at a deviation of 1 px.
+  corners[3].seen_px[1] -= 16;
+  ASSERT_TRUE(refine_pose(camera, corners.data(), corners.size(), start, refined));
+  EXPECT_NEAR(refined.chi_square, 128, 10);
+  EXPECT_FALSE(refine_pose(camera, corners.data(), 2, start, refined));
+  EXPECT_FALSE(refine_pose(camera, corners.data(), corners.size(), pose_of(0, 0, 0, {0, 0, -1}), refined));
+}
+
+}  // namespace
+}  // namespace berth
