@@ -10,6 +10,7 @@ namespace berth::cli {
 void add_demo(CLI::App& app, Console& console, int& exit_code);
 void add_detect(CLI::App& app, Console& console, int& exit_code);
 void add_flight(CLI::App& app, Console& console, int& exit_code);
+void add_print_tag(CLI::App& app, Console& console, int& exit_code);
 void add_run(CLI::App& app, Console& console, int& exit_code);
 void add_verify(CLI::App& app, Console& console, int& exit_code);
 void add_bench(CLI::App& app, Console& console, int& exit_code);

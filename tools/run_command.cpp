@@ -19,9 +19,10 @@ constexpr const char* kExamples = R"(Examples:
   berth bench --explain                          how long a frame takes on each backend, and where
   berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
   berth model show lite.berthnet                 its layers, with their sizes and costs
+  berth print-tag tag36h11 7 --size 0.08 --out tag.pdf   a marker on paper, at true size
   berth doctor                                   what this machine has, and what it lacks
 
-Exit codes: 0 all well; 1 verify or eval found a difference, or a demo found nothing; 2 bad input or usage.)";
+Exit codes: 0 all well; 1 verify or eval found a difference, or a flight did not dock; 2 bad input or usage.)";
 
 /// "a, b or c": the commands below one; empty where there are none.
 std::string choices_of(const CLI::App& command) {
@@ -52,6 +53,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_bench(app, console, exit_code);
   add_eval(app, console, exit_code);
   add_model(app, console, exit_code);
+  add_print_tag(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.
   if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);

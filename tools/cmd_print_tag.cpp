@@ -1,0 +1,105 @@
+// berth print-tag: markers on paper, at true size.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "berth/error.hpp"
+#include "commands.hpp"
+#include "output_file.hpp"
+#include "tag_sheet.hpp"
+
+namespace berth::cli {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  berth print-tag tag36h11 7 --size 0.08 --out tag.pdf
+  berth print-tag tagStandard41h12 0 --size 0.03 --grid 4x5 --out sheet.svg
+  berth print-tag aruco4x4_50 3 --size 0.2 --paper a3 --out tag.pdf
+
+--size is the side of the square that the corners span, the one to give to --size of detect and run; a ruler on the page
+shows whether the printer kept to it.)";
+
+struct PrintCommand {
+  std::string family;
+  std::string grid = "1x1";
+  std::string paper = "a4";
+  std::string out;
+  int id = 0;
+  double size_m = 0;
+  double gap_m = 0;
+};
+
+/// "FIRSTxSECOND", both whole numbers within the limits.
+bool two_numbers(const std::string& text, int least, int most, int& first, int& second) {
+  int used = 0;
+  const bool read = std::sscanf(text.c_str(), "%6dx%6d%n", &first, &second, &used) == 2;
+  const auto within = [&](int value) { return value >= least && value <= most; };
+  return read && used == static_cast<int>(text.size()) && within(first) && within(second);
+}
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+TagSheet sheet_of(const PrintCommand& command) {
+  TagSheet sheet;
+  sheet.family = &family(command.family);
+  sheet.first_id = command.id;
+  sheet.side_mm = command.size_m * 1000;
+  sheet.gap_mm = command.gap_m * 1000;
+  if (!two_numbers(command.grid, 1, 100, sheet.columns, sheet.rows)) {
+    throw Error("--grid '" + command.grid + "': give columns x rows, whole numbers from 1 to 100, e.g. 3x4");
+  }
+  if (command.paper == "a3") {
+    sheet.width_mm = 297;
+    sheet.height_mm = 420;
+  } else if (command.paper == "letter") {
+    sheet.width_mm = 215.9;
+    sheet.height_mm = 279.4;
+  } else if (command.paper != "a4") {
+    int width = 0;
+    int height = 0;
+    if (!two_numbers(command.paper, 20, 5000, width, height)) {
+      throw Error("--paper '" + command.paper + "': give a4, a3, letter, or millimetres from 20 to 5000 like 300x200");
+    }
+    sheet.width_mm = width;
+    sheet.height_mm = height;
+  }
+  return sheet;
+}
+
+int print_tag(const PrintCommand& command, Console& console) {
+  const bool pdf = ends_with(command.out, ".pdf");
+  if (!pdf && !ends_with(command.out, ".svg")) throw Error("--out '" + command.out + "': name a .pdf or .svg file");
+  const TagSheet sheet = sheet_of(command);
+  const PrintPage page = draw_sheet(sheet);
+  write_file(command.out, "the page", pdf ? page.pdf() : page.svg());
+  console.out() << fmt::format("{}: {} {}, {:.4g} mm; print at 100 % and check the ruler\n", command.out,
+                               sheet.family->name, command.id, sheet.side_mm);
+  return kOk;
+}
+
+}  // namespace
+
+void add_print_tag(CLI::App& app, Console& console, int& exit_code) {
+  CLI::App* command = app.add_subcommand("print-tag", "Markers on paper, at true size, as PDF or SVG");
+  const auto options = std::make_shared<PrintCommand>();
+  command->add_option("family", options->family, "marker family")->type_name("FAMILY")->required();
+  command->add_option("id", options->id, "marker, or the first of a grid")->type_name("ID")->required();
+  command->add_option("--size", options->size_m, "side of the square that the corners span, metres")
+      ->type_name("METRES")
+      ->check(CLI::Range(0.001, 10.0))
+      ->required();
+  command->add_option("--out", options->out, "a .pdf or .svg file")->type_name("FILE")->required();
+  command->add_option("--grid", options->grid, "columns x rows of consecutive ids")->capture_default_str();
+  command->add_option("--gap", options->gap_m, "between neighbouring squares, metres [two modules of white]")
+      ->type_name("METRES")
+      ->check(CLI::Range(0.0, 10.0));
+  command->add_option("--paper", options->paper, "a4, a3, letter, or WIDTHxHEIGHT in mm")->capture_default_str();
+  command->footer(kExamples);
+  command->callback([options, &console, &exit_code] { exit_code = print_tag(*options, console); });
+}
+
+}  // namespace berth::cli
