@@ -21,6 +21,7 @@ NavigatorConfig tiny_config() {
   config.network = kTiny;
   // The tiny network knows nothing: its scores lie around a half, so every frame has some of both kinds.
   config.threshold_q15 = 17000;
+  config.first_threshold_q15 = 17000;
   config.search_threshold_q15 = 16500;
   return config;
 }
@@ -73,6 +74,7 @@ TEST(Navigator, LooksTheSameOnEveryBackend) {
 TEST(Navigator, FollowsUntilItIsTold) {
   NavigatorConfig config = tiny_config();
   config.threshold_q15 = 1;
+  config.first_threshold_q15 = 1;
   config.search_threshold_q15 = 1;
   const std::unique_ptr<Backend> backend = open_backend("simd");
   Navigator navigator(*backend, 640, 480, config);
@@ -89,9 +91,25 @@ TEST(Navigator, FollowsUntilItIsTold) {
   EXPECT_EQ(again.d_q16, first.d_q16);
 }
 
+TEST(Navigator, AsksMoreOfTheFirstSight) {
+  NavigatorConfig config = tiny_config();
+  config.threshold_q15 = 1;
+  config.search_threshold_q15 = 1;
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  const GrayImage image = noise(640, 480, 5);
+  config.first_threshold_q15 = 1;
+  const int score = Navigator(*backend, 640, 480, config).look(image.view()).score_q15;
+  config.first_threshold_q15 = score + 1;
+  Navigator stricter(*backend, 640, 480, config);
+  EXPECT_EQ(stricter.look(image.view()).status, FrameStatus::no_target);
+  stricter.expect(320, 240, 96);  // what is followed needs less
+  EXPECT_EQ(stricter.look(image.view()).status, FrameStatus::ok);
+}
+
 TEST(Navigator, GivesBearingAndRangeThroughTheCamera) {
   NavigatorConfig config = tiny_config();
   config.threshold_q15 = 1;
+  config.first_threshold_q15 = 1;
   config.search_threshold_q15 = 1;
   config.camera = paper_camera();
   const std::unique_ptr<Backend> backend = open_backend("simd");

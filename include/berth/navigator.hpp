@@ -19,8 +19,11 @@ struct NavigatorConfig {
   std::optional<CameraModel> camera;
   /// Diameter of the sphere around the target, m.
   double target_diameter_m = 0.4;
-  /// Least score of a sighting, Q15.
+  /// Least score where the last frame had the target, Q15.
   int threshold_q15 = 16384;
+  /// Least score of what a search found, Q15. Higher: of the hundreds of places in a frame the best is taken, and where
+  /// there is no target that is something like it (docs/navigation.md has the figures).
+  int first_threshold_q15 = 29491;
   /// Least score of a place in the whole image that is worth a closer look, Q15.
   int search_threshold_q15 = 8192;
   /// One standard deviation of the range, as a share of it: 68 % of the errors of the network that comes with Berth lie

@@ -16,8 +16,8 @@ namespace {
 constexpr int kMinSide = 64;
 constexpr int kMaxSide = 16384;
 
-/// The search sees the frame this high, px: a target of 22 to 178 px in a 480 px frame has half of that.
-constexpr int kSearchHeight = 240;
+/// The search sees the frame this high, px: what is smaller than 40 px there is not what the network was trained on.
+constexpr int kSearchHeight = 480;
 /// The target's middle may be this far from a window's for the network to know it, search px.
 constexpr int kReach = 32;
 /// Places looked at closely in one frame.
@@ -199,9 +199,10 @@ const Sighting& Navigator::look(View2D<const u8> image, const FrameStamp& stamp)
   bool alive = !had_it || it.follow_last();
   sighting.tracked = had_it && alive && sighting.score_q15 >= it.config.threshold_q15;
   if (alive && !sighting.tracked) alive = it.search_frame();
-  sighting.status = !alive                                          ? FrameStatus::device_lost
-                    : sighting.score_q15 >= it.config.threshold_q15 ? FrameStatus::ok
-                                                                    : FrameStatus::no_target;
+  const int least = sighting.tracked ? it.config.threshold_q15 : it.config.first_threshold_q15;
+  sighting.status = !alive                        ? FrameStatus::device_lost
+                    : sighting.score_q15 >= least ? FrameStatus::ok
+                                                  : FrameStatus::no_target;
   it.measure();
   return sighting;
 }
