@@ -67,6 +67,24 @@ inline Mat3 small_rotation(const Vec3& w) {
           k * (h[0] * h[2] - h[1]),  k * (h[1] * h[2] + h[0]),  1 + k * (h[2] * h[2] - n)};
 }
 
+/// The w of small_rotation(w), for turns of less than half a circle.
+inline Vec3 turn_of(const Mat3& r) {
+  const double k = 2 / (1 + r[0] + r[4] + r[8]);
+  return {k * (r[7] - r[5]), k * (r[2] - r[6]), k * (r[3] - r[1])};
+}
+
+/// What takes `from` to `to`: translation, and the turn w of small_rotation(w) · from.R.
+inline std::array<double, 6> step_between(const Pose& from, const Pose& to) {
+  const Vec3 w = turn_of(product(to.R, transposed(from.R)));
+  return {to.t[0] - from.t[0], to.t[1] - from.t[1], to.t[2] - from.t[2], w[0], w[1], w[2]};
+}
+
+/// The inverse of step_between: `step` added to a pose.
+inline Pose moved(const Pose& pose, const std::array<double, 6>& step) {
+  return {product(small_rotation({step[3], step[4], step[5]}), pose.R),
+          {pose.t[0] + step[0], pose.t[1] + step[1], pose.t[2] + step[2]}};
+}
+
 /// Inverse; the determinant must not be zero.
 inline Mat3 inverse(const Mat3& m) {
   const Vec3 a = {m[0], m[3], m[6]}, b = {m[1], m[4], m[7]}, c = {m[2], m[5], m[8]};

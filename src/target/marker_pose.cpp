@@ -1,26 +1,21 @@
 #include "target/marker_pose.hpp"
 
-#include <cmath>
 #include <utility>
 
 #include "pose_algebra.hpp"
 #include "target/planar_pose.hpp"
 #include "target/refine_pose.hpp"
+#include "target/symmetric.hpp"
 
 namespace berth {
 namespace {
 
-// Two refinements that end this near are one: of each matrix element, and of a metre.
-constexpr double kSame = 1e-6;
+// Refinements nearer than this are one, in squares of standard deviations: a tenth of one.
+constexpr double kSame = 0.01;
 
-bool same(const Pose& a, const Pose& b) {
-  for (std::size_t i = 0; i < 9; ++i) {
-    if (std::fabs(a.R[i] - b.R[i]) > kSame) return false;
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (std::fabs(a.t[i] - b.t[i]) > kSame) return false;
-  }
-  return true;
+bool same(const RefinedPose& a, const RefinedPose& b) {
+  SquareMatrix<6> information{};
+  return invert<6>(a.covariance, information) && quadratic<6>(information, step_between(a.pose, b.pose)) < kSame;
 }
 
 // The marker's z axis points away from who sees its front.
@@ -28,16 +23,22 @@ bool shows_front(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0; 
 
 }  // namespace
 
-bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
-                 const std::array<std::array<double, 2>, 4>& corners_px, Pose& pose, PoseUncertainty& uncertainty) {
-  std::array<Pose, 2> starts;
-  const int count = planar_poses(camera, size_m, corners_px, starts);
+std::array<PoseCorner, 4> pose_corners(double size_m, double deviation_px,
+                                       const std::array<std::array<double, 2>, 4>& corners_px) {
   const double h = size_m / 2, variance = deviation_px * deviation_px;
   const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
   std::array<PoseCorner, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
     corners[i] = {{place[i][0], place[i][1], 0}, corners_px[i], {variance, 0, variance}};
   }
+  return corners;
+}
+
+bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
+                 const std::array<std::array<double, 2>, 4>& corners_px, Pose& pose, PoseUncertainty& uncertainty) {
+  std::array<Pose, 2> starts;
+  const int count = planar_poses(camera, size_m, corners_px, starts);
+  const std::array<PoseCorner, 4> corners = pose_corners(size_m, deviation_px, corners_px);
   std::array<RefinedPose, 2> refined;
   std::size_t found = 0;
   for (int k = 0; k < count; ++k) {
@@ -51,7 +52,7 @@ bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
   if (found == 2 && refined[1].error_px < refined[0].error_px) std::swap(refined[0], refined[1]);
   pose = refined[0].pose;
   uncertainty = {refined[0].covariance, refined[0].error_px, false, {}, 0};
-  if (found == 2 && !same(refined[0].pose, refined[1].pose)) {
+  if (found == 2 && !same(refined[0], refined[1])) {
     uncertainty.has_other = true;
     uncertainty.other = refined[1].pose;
     uncertainty.other_error_px = refined[1].error_px;

@@ -4,51 +4,23 @@
 #include <cmath>
 
 #include "pose_algebra.hpp"
+#include "target/symmetric.hpp"
 
 namespace berth {
 namespace {
 
 constexpr std::size_t kUnknowns = 6;
 using Vec6 = std::array<double, kUnknowns>;
-using Mat6 = std::array<double, kUnknowns * kUnknowns>;
+using Mat6 = SquareMatrix<kUnknowns>;
 
-constexpr int kMostSteps = 20;
-// A step that promises to lower the sum of squares (standard deviations) by less than this share changes nothing that
-// could be measured.
-constexpr double kLeastGain = 1e-12;
+// Steps end when one promises to lower the sum of squares (standard deviations) by less than the first share of it.
+// Where a plane's two poses have become one, least squares are as flat as a fourth power and come nearer ever more
+// slowly: what promises less than the second share there is within the noise.
+constexpr int kMostSteps = 30;
+constexpr double kLeastGain = 1e-9, kEnough = 1e-3;
 constexpr double kNearest_m = 1e-6;
 // Relative to the diagonal. Below the least it is as good as none, and would only take longer to rise again.
 constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-7;
-
-// Lower triangle L of a = L Lᵀ in place; false where a is not positive definite.
-bool factorise(Mat6& a) {
-  for (std::size_t j = 0; j < kUnknowns; ++j) {
-    double d = a[j * kUnknowns + j];
-    const double whole = d;
-    for (std::size_t k = 0; k < j; ++k) d -= a[j * kUnknowns + k] * a[j * kUnknowns + k];
-    if (!(d > 1e-14 * whole)) return false;
-    const double root = std::sqrt(d);
-    a[j * kUnknowns + j] = root;
-    for (std::size_t i = j + 1; i < kUnknowns; ++i) {
-      double v = a[i * kUnknowns + j];
-      for (std::size_t k = 0; k < j; ++k) v -= a[i * kUnknowns + k] * a[j * kUnknowns + k];
-      a[i * kUnknowns + j] = v / root;
-    }
-  }
-  return true;
-}
-
-Vec6 solve(const Mat6& factor, Vec6 b) {
-  for (std::size_t i = 0; i < kUnknowns; ++i) {
-    for (std::size_t k = 0; k < i; ++k) b[i] -= factor[i * kUnknowns + k] * b[k];
-    b[i] /= factor[i * kUnknowns + i];
-  }
-  for (std::size_t i = kUnknowns; i-- > 0;) {
-    for (std::size_t k = i + 1; k < kUnknowns; ++k) b[i] -= factor[k * kUnknowns + i] * b[k];
-    b[i] /= factor[i * kUnknowns + i];
-  }
-  return b;
-}
 
 // Normal equations of all corners at one pose, in units of standard deviations.
 struct Normal {
@@ -102,61 +74,68 @@ bool add_corner(const CameraModel& camera, const Pose& pose, const PoseCorner& c
   return true;
 }
 
-bool linearise(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& pose,
-               Normal& normal) {
+// The distance from what was expected. Turns compose as Gibbs vectors, h' = (a + h + a x h) / (1 - a.h), a and h halves
+// of the turns: from a = 0 the derivative is 1 - [h]x + h hT.
+void add_prior(const Pose& pose, const PosePrior& prior, Normal& normal) {
+  const Vec6 off = step_between(prior.pose, pose);
+  const double x = off[3] / 2, y = off[4] / 2, z = off[5] / 2;
+  const Mat6 by_step = {1, 0, 0, 0,         0,         0,          //
+                        0, 1, 0, 0,         0,         0,          //
+                        0, 0, 1, 0,         0,         0,          //
+                        0, 0, 0, 1 + x * x, x * y + z, x * z - y,  //
+                        0, 0, 0, x * y - z, 1 + y * y, y * z + x,  //
+                        0, 0, 0, x * z + y, y * z - x, 1 + z * z};
+  const Mat6 weighted = multiply<kUnknowns>(transposed<kUnknowns>(by_step), prior.information);
+  const Mat6 matrix = multiply<kUnknowns>(weighted, by_step);
+  const Vec6 gradient = multiply<kUnknowns>(weighted, off);
+  for (std::size_t i = 0; i < kUnknowns; ++i) normal.gradient[i] -= gradient[i];
+  for (std::size_t i = 0; i < kUnknowns * kUnknowns; ++i) normal.matrix[i] += matrix[i];
+  normal.squares += quadratic<kUnknowns>(prior.information, off);
+}
+
+bool linearise(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const PosePrior* prior,
+               const Pose& pose, Normal& normal) {
   normal = {};
   for (std::size_t i = 0; i < count; ++i) {
     if (!add_corner(camera, pose, corners[i], normal)) return false;
   }
+  if (prior != nullptr) add_prior(pose, *prior, normal);
   return normal.squares - normal.squares == 0;
-}
-
-Pose moved(const Pose& pose, const Vec6& step) {
-  Pose result;
-  result.R = product(small_rotation({step[3], step[4], step[5]}), pose.R);
-  result.t = {pose.t[0] + step[0], pose.t[1] + step[1], pose.t[2] + step[2]};
-  return result;
 }
 
 }  // namespace
 
 bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
-                 RefinedPose& result) {
+                 RefinedPose& result, const PosePrior* prior) {
   if (count < 3) return false;
   Normal here;
   Pose pose = start;
-  if (!linearise(camera, corners, count, pose, here)) return false;
+  if (!linearise(camera, corners, count, prior, pose, here)) return false;
   double damping = kFirstDamping;
-  bool settled = false;
-  for (int k = 0; k < kMostSteps && !settled; ++k) {
+  double gain = 1;  // relative, that the last step promised
+  for (int k = 0; k < kMostSteps && gain > kLeastGain; ++k) {
     Mat6 damped = here.matrix;
     for (std::size_t i = 0; i < kUnknowns; ++i) damped[i * kUnknowns + i] *= 1 + damping;
-    if (!factorise(damped)) return false;
-    const Vec6 step = solve(damped, here.gradient);
+    if (!factorise<kUnknowns>(damped)) return false;
+    const Vec6 step = solve<kUnknowns>(damped, here.gradient);
     double promised = 0;
     for (std::size_t i = 0; i < kUnknowns; ++i) promised += step[i] * here.gradient[i];
     const Pose next = moved(pose, step);
     Normal there;
-    if (linearise(camera, corners, count, next, there) && there.squares <= here.squares) {
+    if (linearise(camera, corners, count, prior, next, there) && there.squares <= here.squares) {
       pose = next;
       here = there;
       damping = std::max(kLeastDamping, damping * 0.1);
     } else {
       damping *= 10;
     }
-    settled = !(promised > kLeastGain * (1 + here.squares));
+    gain = promised / (1 + here.squares);
   }
-  if (!settled) return false;
-  Mat6 factor = here.matrix;
-  if (!factorise(factor)) return false;
-  for (std::size_t j = 0; j < kUnknowns; ++j) {
-    Vec6 unit{};
-    unit[j] = 1;
-    const Vec6 column = solve(factor, unit);
-    for (std::size_t i = j; i < kUnknowns; ++i) {
-      result.covariance[i * kUnknowns + j] = result.covariance[j * kUnknowns + i] = column[i];
-    }
+  if (!(gain < kEnough)) return false;
+  for (std::size_t i = 0; i < kUnknowns; ++i) {  // only the lower half is complete
+    for (std::size_t j = i + 1; j < kUnknowns; ++j) here.matrix[i * kUnknowns + j] = here.matrix[j * kUnknowns + i];
   }
+  if (!invert<kUnknowns>(here.matrix, result.covariance)) return false;
   result.pose = pose;
   result.chi_square = here.squares;
   result.error_px = std::sqrt(here.squares_px / static_cast<double>(count));

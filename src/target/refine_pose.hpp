@@ -16,6 +16,13 @@ struct PoseCorner {
   std::array<double, 3> covariance_px2 = {1, 0, 1};
 };
 
+/// What is known of a pose before its corners are seen.
+struct PosePrior {
+  Pose pose;
+  /// Inverse of its covariance (as PoseUncertainty's).
+  std::array<double, 36> information = {};
+};
+
 /// A pose after refinement.
 struct RefinedPose {
   Pose pose;
@@ -23,15 +30,16 @@ struct RefinedPose {
   std::array<double, 36> covariance = {};
   /// Root mean square distance of the corners from where the pose says they are, px.
   double error_px = 0;
-  /// Sum of squares in standard deviations: chi-square with 2 count - 6 degrees of freedom where the model holds.
+  /// Sum of squares in standard deviations, those from the prior included: chi-square where the model holds, with
+  /// 2 count - 6 degrees of freedom, 2 count with a prior.
   double chi_square = 0;
 };
 
-/// Least squares of the corners' reprojection errors, weighted by their covariances, from a pose nearby
-/// (Levenberg-Marquardt, rotations by Cayley's form). Returns false, and leaves `result` alone,
-/// where the start has a corner behind the camera, the corners do not determine the pose, or 20 steps do not come to an
-/// end. Needs three corners or more.
+/// Least squares of the corners' reprojection errors, weighted by their covariances, and of the distance from a prior
+/// if there is one, from a pose nearby (Levenberg-Marquardt, rotations by Cayley's form). Returns false, and leaves
+/// `result` alone, where the start has a corner behind the camera, the corners do not determine the pose, or 30 steps
+/// do not come to an end. Needs three corners or more.
 bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
-                 RefinedPose& result);
+                 RefinedPose& result, const PosePrior* prior = nullptr);
 
 }  // namespace berth
