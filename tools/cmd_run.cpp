@@ -12,6 +12,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
   berth run --source dir:recording/ --json - | jq .detections
+  berth run --source sim:scenarios/approach.toml --filter --json log.jsonl
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
 
@@ -35,6 +36,8 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("FILE");
   command->add_option("--svg", options->stream.svg, "drawing of the trajectory")->type_name("FILE");
   command->add_flag("--digests", options->stream.digests, "log a digest of every stage's output (slow)");
+  command->add_flag("--filter", options->stream.filter,
+                    "poses filtered over time, with velocities, beside the raw ones");
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str();

@@ -8,11 +8,13 @@
 #include <fstream>
 #include <map>
 #include <set>
+#include <string_view>
 
 #include "annotate.hpp"
 #include "berth/error.hpp"
 #include "frame_json.hpp"
 #include "live_view.hpp"
+#include "marker_filters.hpp"
 #include "output_file.hpp"
 #include "trajectory_svg.hpp"
 #include "truth_score.hpp"
@@ -116,6 +118,7 @@ class StreamRun {
     }
     if (timed.difference) report_difference(frame.label, *timed.difference);
     scale_poses(result.detections, frame.truth);
+    if (options_.filter) filter(frame, result);
     ++frames_;
     frames_with_markers_ += result.detections.empty() ? 0 : 1;
     overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
@@ -123,7 +126,9 @@ class StreamRun {
     cpu_ns_ += timed.cpu_ns;
     if (!options_.log.empty()) {
       std::ostream& log = options_.log == "-" ? console_.out() : log_;
-      log << to_line(to_json(result, frame.label, timed.cpu_ns, frame.truth)) << '\n';
+      Json line = to_json(result, frame.label, timed.cpu_ns, frame.truth);
+      if (options_.filter) line["filtered"] = filters_.to_json();
+      log << to_line(line) << '\n';
     }
     if (!frame.truth.empty()) {
       score_.add(frame.truth, result.detections);
@@ -139,6 +144,15 @@ class StreamRun {
     if (result.status == FrameStatus::device_lost) {
       throw Error(frame.label + ": the device was lost; see berth doctor, or use --backend simd");
     }
+  }
+
+  void filter(const SourceFrame& frame, const FrameResult& result) {
+    if (std::string_view(frame.stamp.clock) == "none") {
+      throw Error(frame.label +
+                  ": frames without times cannot be filtered; leave --filter out, or use a video or a live source");
+    }
+    filters_.update(result, engine_->config(), frame.truth);
+    if (!frame.truth.empty()) filtered_score_.add(frame.truth, filters_.as_detections());
   }
 
   void report_difference(const std::string& label, const StageDifference& difference) {
@@ -227,6 +241,10 @@ class StreamRun {
     }
     people_ << '\n';
     if (has_truth_) score_.print(people_);
+    if (has_truth_ && options_.filter) {
+      people_ << "filtered over time:\n";
+      filtered_score_.print(people_);
+    }
     if (!options_.log.empty() && options_.log != "-") {
       log_.close();
       if (!log_) throw Error(options_.log + ": writing the log failed; check the disk's space");
@@ -272,7 +290,8 @@ class StreamRun {
   bool size_given_ = false, refused_ = false, has_truth_ = false;
   std::uint64_t frames_ = 0, frames_with_markers_ = 0, overflows_ = 0, differing_ = 0;
   std::int64_t wall_ns_ = 0, cpu_ns_ = 0;
-  TruthScore score_;
+  TruthScore score_, filtered_score_;
+  MarkerFilters filters_;
   std::map<MarkerKey, std::vector<Trajectory::Point>> ways_;
   GrayImage picture_;
   std::vector<Detection> picture_detections_;

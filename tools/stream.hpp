@@ -19,6 +19,8 @@ struct StreamOptions {
   /// Annotated PNG of the last of the frames with the most markers.
   std::string picture;
   bool digests = false;
+  /// Poses filtered over time, beside the raw ones.
+  bool filter = false;
   /// 0 for all.
   std::uint64_t max_frames = 0;
 };

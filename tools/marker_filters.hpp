@@ -1,0 +1,40 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "berth/detector.hpp"
+#include "berth/pose_filter.hpp"
+#include "berth/source.hpp"
+#include "frame_json.hpp"
+
+namespace berth::cli {
+
+/// A pose filter for each marker of a stream.
+class MarkerFilters {
+ public:
+  /// Markers beyond so many are not filtered.
+  static constexpr std::size_t kMost = 64;
+
+  /// Takes a frame: detections with poses of markers whose size is the configuration's, or the truth's where it has
+  /// one.
+  void update(const FrameResult& frame, const DetectorConfig& config, const std::vector<TruthMarker>& truth);
+
+  /// Every marker with a track: family, id, pose, velocity and what is known of them.
+  Json to_json() const;
+  /// As detections, to be compared with truth.
+  const std::vector<Detection>& as_detections() const { return poses_; }
+
+ private:
+  struct Track {
+    PoseFilter filter;
+    const MarkerFamily* family;
+    FilteredPose pose;
+  };
+  std::map<std::pair<std::string, int>, Track> tracks_;
+  std::vector<Detection> poses_;
+};
+
+}  // namespace berth::cli
