@@ -12,6 +12,7 @@ void add_detect(CLI::App& app, Console& console, int& exit_code);
 void add_flight(CLI::App& app, Console& console, int& exit_code);
 void add_print_tag(CLI::App& app, Console& console, int& exit_code);
 void add_run(CLI::App& app, Console& console, int& exit_code);
+void add_table(CLI::App& app, Console& console, int& exit_code);
 void add_verify(CLI::App& app, Console& console, int& exit_code);
 void add_bench(CLI::App& app, Console& console, int& exit_code);
 void add_eval(CLI::App& app, Console& console, int& exit_code);

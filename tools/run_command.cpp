@@ -20,6 +20,7 @@ constexpr const char* kExamples = R"(Examples:
   berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
   berth model show lite.berthnet                 its layers, with their sizes and costs
   berth print-tag tag36h11 7 --size 0.08 --out tag.pdf   a marker on paper, at true size
+  berth table                                    the paper's six-axis table, simulated: errors of every axis
   berth doctor                                   what this machine has, and what it lacks
 
 Exit codes: 0 all well; 1 verify or eval found a difference, or a flight did not dock; 2 bad input or usage.)";
@@ -54,6 +55,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_eval(app, console, exit_code);
   add_model(app, console, exit_code);
   add_print_tag(app, console, exit_code);
+  add_table(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.
   if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);

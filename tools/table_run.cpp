@@ -1,0 +1,40 @@
+#include "table_run.hpp"
+
+#include "sim/random.hpp"
+
+namespace berth::cli {
+namespace {
+
+constexpr double kWholly = 0.999;
+
+}  // namespace
+
+table::SweepErrors TableSweep::errors(std::size_t method) const {
+  table::SweepErrors errors;
+  for (const TableFrame& frame : frames) {
+    if (!frame.shown) continue;
+    ++errors.shown;
+    const std::optional<Reading>& reading = frame.readings[method];
+    if (!reading) continue;
+    ++errors.found;
+    errors.add(reading->pose, frame.truth.pose);
+    errors.add_corners(reading->corners, frame.truth.corners);
+  }
+  return errors;
+}
+
+TableSweep run_sweep(const table::Sweep& sweep, const table::Stage& stage, u64 seed, TableReaders& readers,
+                     const std::function<void()>& progress) {
+  TableSweep run{sweep, {}};
+  for (std::size_t i = 0; i < sweep.stops.size(); ++i) {
+    const table::Stop& stop = sweep.stops[i];
+    const table::StageFrame seen = stage.look(stop, sim::scatter(seed ^ sim::scatter(i)));
+    TableFrame frame{stop.travel, seen.truth, seen.truth.visible >= kWholly, {}};
+    frame.readings = readers.read(seen.image.view(), stop.size_m);
+    run.frames.push_back(std::move(frame));
+    progress();
+  }
+  return run;
+}
+
+}  // namespace berth::cli

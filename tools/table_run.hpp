@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "table/pose_error.hpp"
+#include "table/stage.hpp"
+#include "table_readers.hpp"
+
+namespace berth::cli {
+
+/// One frame of the table, as it was and as it was read.
+struct TableFrame {
+  double travel = 0;
+  TruthMarker truth;
+  /// The marker was wholly in view; frames where it was not count for nothing.
+  bool shown = false;
+  /// One of each method, in TableReaders' order.
+  std::vector<std::optional<Reading>> readings;
+};
+
+/// One experiment with its frames.
+struct TableSweep {
+  table::Sweep sweep;
+  std::vector<TableFrame> frames;
+
+  table::SweepErrors errors(std::size_t method) const;
+};
+
+/// Looks at every stop once. `progress` is called after each frame.
+TableSweep run_sweep(const table::Sweep& sweep, const table::Stage& stage, u64 seed, TableReaders& readers,
+                     const std::function<void()>& progress);
+
+}  // namespace berth::cli
