@@ -28,8 +28,7 @@ std::string extent(const TableSweep& run) {
 
 /// Standard deviation of the noise at a white surface in the image's middle, grey levels.
 double noise_at_white(const sim::Sensor& sensor) {
-  const double shot =
-      sensor.full_well_e > 0 ? (sensor.white_level - sensor.black_level) * 255 / sensor.full_well_e : 0;
+  const double shot = sensor.full_well_e > 0 ? (sensor.white_level - sensor.black_level) * 255 / sensor.full_well_e : 0;
   return std::sqrt(shot + sensor.read_noise * sensor.read_noise);
 }
 
@@ -42,7 +41,8 @@ std::string setup_text(const table::Stage& stage, const table::Nominal& nominal,
   return fmt::format(
       "camera      {}×{}, f {:.2f} {:.2f} px, centre {:.2f} {:.2f}, k1 {:g}, k2 {:g}\n"
       "marker      {} {}, side {:g} mm: {:.1f} px at {:g} m\n"
-      "sensor      blur σ {:g} px, defocus {:g} px, white {:g}, black {:g}, read noise {:g}, full well {:g} e: noise at "
+      "sensor      blur σ {:g} px, defocus {:g} px, white {:g}, black {:g}, read noise {:g}, full well {:g} e: noise "
+      "at "
       "white {:.2f} grey levels; 8 bits\n"
       "frames      {} an experiment, at rest during the exposure; seed {}\n"
       "backend     {}\n",
@@ -69,8 +69,8 @@ std::string axes_table(const std::vector<TableSweep>& sweeps, const MethodNames&
         return fmt::format("{:.3f} | {:.3f}", 100 * share.largest(), 100 * share.rms());
       };
       text += fmt::format("| {} | {} | {} | {:.3f} {} | {:.3f} {} | {} | {:.3f} |\n", extent(run), methods[m],
-                          found_text(errors), scale_of(axis) * own.largest(), unit_of(axis),
-                          scale_of(axis) * own.rms(), unit_of(axis), shares(), errors.corners_px.rms());
+                          found_text(errors), scale_of(axis) * own.largest(), unit_of(axis), scale_of(axis) * own.rms(),
+                          unit_of(axis), shares(), errors.corners_px.rms());
     }
   }
   return text;
@@ -90,23 +90,25 @@ std::string crosstalk_table(const std::vector<TableSweep>& sweeps, const MethodN
 }
 
 std::string rectangle_table(const TableSweep& sweep, const MethodNames& methods) {
-  std::string text = title("Rectangle of 60 × 40 cm: what moving in the plane does to z and rz") +
-                     "| method | found | Z-XY max mm | Z-XY RMS mm | Rz-XY max ° | Rz-XY RMS ° | x RMS mm | y RMS mm |\n"
-                     "|---|---|---|---|---|---|---|---|\n";
+  std::string text =
+      title("Rectangle of 60 × 40 cm: what moving in the plane does to z and rz") +
+      "| method | found | Z-XY max mm | Z-XY RMS mm | Rz-XY max ° | Rz-XY RMS ° | x RMS mm | y RMS mm |\n"
+      "|---|---|---|---|---|---|---|---|\n";
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const table::SweepErrors errors = sweep.errors(m);
     const auto& axes = errors.axes;
-    text += fmt::format("| {} | {} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} |\n", methods[m],
-                        found_text(errors), 1000 * axes[2].largest(), 1000 * axes[2].rms(),
-                        kDegrees * axes[5].largest(), kDegrees * axes[5].rms(), 1000 * axes[0].rms(),
-                        1000 * axes[1].rms());
+    text +=
+        fmt::format("| {} | {} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} |\n", methods[m],
+                    found_text(errors), 1000 * axes[2].largest(), 1000 * axes[2].rms(), kDegrees * axes[5].largest(),
+                    kDegrees * axes[5].rms(), 1000 * axes[0].rms(), 1000 * axes[1].rms());
   }
   return text;
 }
 
 std::string still_table(const TableSweep& sweep, const MethodNames& methods) {
-  std::string text = title("At rest: mean error ± standard deviation of a frame") +
-                     "| method | found | x mm | y mm | z mm | rx ° | ry ° | rz ° |\n|---|---|---|---|---|---|---|---|\n";
+  std::string text =
+      title("At rest: mean error ± standard deviation of a frame") +
+      "| method | found | x mm | y mm | z mm | rx ° | ry ° | rz ° |\n|---|---|---|---|---|---|---|---|\n";
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const table::SweepErrors errors = sweep.errors(m);
     text += fmt::format("| {} | {} |", methods[m], found_text(errors));
@@ -120,8 +122,8 @@ std::string still_table(const TableSweep& sweep, const MethodNames& methods) {
 }
 
 std::string ranges_table(const std::vector<TableSweep>& cells, const MethodNames& methods) {
-  std::string text = title("Sizes and ranges, random views: RMS displacement, % of range (found of shown)") +
-                     "| marker | method |";
+  std::string text =
+      title("Sizes and ranges, random views: RMS displacement, % of range (found of shown)") + "| marker | method |";
   std::string line = "|---|---|";
   for (const double range_m : table::grid_ranges_m()) {
     text += fmt::format(" {:g} m |", range_m);
@@ -155,8 +157,8 @@ std::string table_csv(const std::vector<TableSweep>& sweeps, const MethodNames& 
       const auto& t = frame.truth.pose.t;
       for (std::size_t m = 0; m < methods.size(); ++m) {
         const std::optional<Reading>& reading = frame.readings[m];
-        csv += fmt::format("{},{:g},{},{:.6g},{},\"{}\",{},{:.6f},{:.6f},{:.6f}", run.sweep.name, frame.truth.size_m,
-                           i, frame.travel, frame.shown ? 1 : 0, methods[m], reading ? 1 : 0, t[0], t[1], t[2]);
+        csv += fmt::format("{},{:g},{},{:.6g},{},\"{}\",{},{:.6f},{:.6f},{:.6f}", run.sweep.name, frame.truth.size_m, i,
+                           frame.travel, frame.shown ? 1 : 0, methods[m], reading ? 1 : 0, t[0], t[1], t[2]);
         if (reading) {
           const table::SixAxes error = table::pose_error(reading->pose, frame.truth.pose);
           for (std::size_t k = 0; k < 6; ++k) csv += fmt::format(",{:.6f}", scale_of(k) * error[k]);

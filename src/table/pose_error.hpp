@@ -46,8 +46,7 @@ struct SweepErrors {
   ErrorSum corners_px;
 
   void add(const Pose& pose, const Pose& truth);
-  void add_corners(const std::array<std::array<double, 2>, 4>& seen,
-                   const std::array<std::array<double, 2>, 4>& truth);
+  void add_corners(const std::array<std::array<double, 2>, 4>& seen, const std::array<std::array<double, 2>, 4>& truth);
 };
 
 }  // namespace berth::table

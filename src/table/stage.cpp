@@ -17,8 +17,7 @@ StageFrame Stage::look(const Stop& stop, u64 seed) const {
   scene.camera = camera();
   scene.sensor = sensor_;
   scene.seed = seed;
-  scene.background.push_back(
-      sim::flat(sim::translation(0, 0, kWall_m), 0, 0, kWallSide_m, kWallSide_m, kWallAlbedo));
+  scene.background.push_back(sim::flat(sim::translation(0, 0, kWall_m), 0, 0, kWallSide_m, kWallSide_m, kWallAlbedo));
   sim::SceneMarker marker;
   marker.family = kFamily;
   marker.id = kMarker;

@@ -16,8 +16,8 @@ struct StageFrame {
   TruthMarker truth;
 };
 
-/// The simulated camera in front of the table: a marker on its plate before a plain grey wall at 3 m, everything at rest
-/// during the exposure, evenly lit from the camera.
+/// The simulated camera in front of the table: a marker on its plate before a plain grey wall at 3 m, everything at
+/// rest during the exposure, evenly lit from the camera.
 class Stage {
  public:
   /// Throws Error on a lens that is not one-to-one.

@@ -13,14 +13,11 @@ namespace {
 struct Ends {
   double from, to;
 };
-constexpr std::array<Ends, 6> kEnds = {
-    {{-0.3, 0.3}, {-0.2, 0.2}, {0.15, 1.5}, {-60, 60}, {-60, 60}, {-180, 180}}};
+constexpr std::array<Ends, 6> kEnds = {{{-0.3, 0.3}, {-0.2, 0.2}, {0.15, 1.5}, {-60, 60}, {-60, 60}, {-180, 180}}};
 
 constexpr double kWidth_m = 0.6, kHeight_m = 0.4;
 
-Stop nominal_stop(const Nominal& nominal) {
-  return {0, nominal.size_m, sim::translation(0, 0, nominal.range_m)};
-}
+Stop nominal_stop(const Nominal& nominal) { return {0, nominal.size_m, sim::translation(0, 0, nominal.range_m)}; }
 
 }  // namespace
 
@@ -50,7 +47,7 @@ Sweep axis_sweep(std::size_t axis, const Nominal& nominal, int stops) {
 Sweep rectangle_sweep(const Nominal& nominal, int stops) {
   Sweep sweep{"rectangle", "way, m", std::nullopt, {}};
   for (int i = 0; i < stops; ++i) {
-    const double way = 2 * (kWidth_m + kHeight_m) * i / stops;
+    const double way = 2 * (kWidth_m + kHeight_m) * i / (stops - 1);
     const auto part = [way](double from, double length) { return std::clamp(way - from, 0.0, length); };
     Stop stop = nominal_stop(nominal);
     stop.travel = way;

@@ -43,7 +43,8 @@ const std::vector<std::string>& axis_names();
 /// 1.5 m, rx and ry ±60°, rz ±180° about the camera's axes. At least two stops.
 Sweep axis_sweep(std::size_t axis, const Nominal& nominal, int stops);
 
-/// Once around the paper's rectangle, 60 cm across and 40 cm up at the nominal range (its Figures 13 and 14).
+/// Once around the paper's rectangle and back to its start, 60 cm across and 40 cm up at the nominal range (its Figures
+/// 13 and 14). At least two stops.
 Sweep rectangle_sweep(const Nominal& nominal, int stops);
 
 /// The nominal place again and again: what noise alone does.
