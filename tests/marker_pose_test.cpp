@@ -111,6 +111,20 @@ TEST(PlanarPoses, HaveTheTruthAmongThem) {
   }
 }
 
+// Near the saddle between both poses of a plane the refinement is slow.
+TEST(MarkerPose, IsThereForSmallMarkersThatFaceTheCamera) {
+  sim::Random random(3);
+  const CameraModel camera = paper_camera();
+  for (int i = 0; i < 5000; ++i) {
+    const Pose truth = random_pose(random, 0.5, 2, 0.1);
+    Pose found;
+    PoseUncertainty uncertainty;
+    ASSERT_TRUE(
+        marker_pose(camera, kSide_m, 0.15, with_noise(seen_corners(camera, truth), 0.15, random), found, uncertainty))
+        << i;
+  }
+}
+
 TEST(MarkerPose, RecoversPosesOfAllKinds) {
   sim::Random random(2);
   const CameraModel camera = paper_camera();
