@@ -7,7 +7,7 @@
 int main(int argc, char** argv) try {
   const cv::Mat image = cv::imread(argc > 1 ? argv[1] : "dock.png", cv::IMREAD_GRAYSCALE);
   berth::DetectorConfig config;                                 // looks for tag36h11 unless told otherwise
-  config.camera = berth::paper_camera(image.cols, image.rows);  // yours: berth::read_camera_info("camera.yaml")
+  config.camera = berth::paper_camera(image.cols, image.rows);  // yours: berth::read_camera("camera.yaml")
   config.marker_size_m = 0.1;
   const auto backend = berth::open_backend("simd");
   berth::Detector detector(*backend, image.cols, image.rows, config);

@@ -77,6 +77,35 @@ TEST(Detect, JsonLineHasTheDocumentedFields) {
   EXPECT_LT(twice_area, 0);
 }
 
+TEST(Detect, AnotherSizeGivesAPoseOnlyWhenToldHow) {
+  const ScratchFolder folder;
+  const auto pose_with = [&](const CameraModel& camera, const std::vector<std::string>& how, int exit_code) {
+    write_camera_info(folder / "other.yaml", camera);
+    std::vector<std::string> arguments = {"detect", "--json", "--camera", folder / "other.yaml",
+                                          "--size", "0.1",    kImage};
+    arguments.insert(arguments.end(), how.begin(), how.end());
+    const CommandRun run = run_berth(arguments);
+    EXPECT_EQ(run.exit_code, exit_code) << run.err;
+    const json marker = run.lines().at(0)["detections"][0];
+    return marker.contains("pose") ? marker["pose"]["t"].get<std::array<double, 3>>() : std::array<double, 3>{};
+  };
+  const cv::Size size = image_size();
+  const CameraModel fitting = paper_camera(size.width, size.height);
+  const CameraModel twice = paper_camera(2 * size.width, 2 * size.height);
+  CameraModel around = fitting;
+  around.width += 60;
+  around.height += 20;
+  around.cx += 30;
+  around.cy += 10;
+  const std::array<double, 3> expected = pose_with(fitting, {}, 0);
+  EXPECT_GT(expected[2], 0);
+  EXPECT_EQ(pose_with(twice, {}, 2)[2], 0);
+  EXPECT_EQ(pose_with(around, {"--camera-fit", "resize"}, 2)[2], 0);
+  EXPECT_EQ(pose_with(around, {"--camera-fit", "crop"}, 0), expected);
+  const std::array<double, 3> resized = pose_with(twice, {"--camera-fit", "resize"}, 0);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(resized[i], expected[i], 1e-9);
+}
+
 TEST(Detect, PoseNeedsCameraAndSize) {
   const ScratchFolder folder;
   const std::string camera = camera_file(folder);

@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "berth/error.hpp"
+#include "exact_math.hpp"
 #include "sim/body.hpp"
 #include "sim/corpus.hpp"
-#include "sim/exact_math.hpp"
 #include "sim/printed_marker.hpp"
 #include "sim/render.hpp"
 #include "support/image_digest.hpp"
@@ -61,10 +61,12 @@ TEST(ExactMath, AgreesWithLibm) {
     EXPECT_NEAR(exact_exp(x) / std::exp(x), 1, 1e-14) << x;
     EXPECT_NEAR(exact_sin(x), std::sin(x), 3e-15) << x;
     EXPECT_NEAR(exact_cos(x), std::cos(x), 3e-15) << x;
+    EXPECT_NEAR(exact_atan(x), std::atan(x), 5e-16) << x;
   }
   for (double x = 1e-9; x < 1e9; x *= 1.9) {
     EXPECT_NEAR(exact_log(x), std::log(x), 1e-14 * std::max(1.0, std::fabs(std::log(x)))) << x;
     EXPECT_NEAR(exact_pow(x, 0.45) / std::pow(x, 0.45), 1, 1e-13) << x;
+    EXPECT_NEAR(exact_atan(-x) / std::atan(-x), 1, 8e-16) << x;
   }
   EXPECT_EQ(exact_pow(0, 0.45), 0);
 }
@@ -98,6 +100,31 @@ TEST(Truth, CornersAreWhereOpenCvProjectsThem) {
     EXPECT_NEAR(seen[0].corners[i][0], expected[i].x, 1e-9);
     EXPECT_NEAR(seen[0].corners[i][1], expected[i].y, 1e-9);
   }
+}
+
+TEST(Truth, AFisheyeIsWhatOpenCvSays) {
+  CameraModel camera = paper_camera();
+  camera.fx = 302;
+  camera.fy = 301;
+  camera.lens = LensModel::equidistant;
+  camera.distortion = {-0.03, 0.012, -0.006, 0.001};
+  const RayMap rays(camera);
+  for (int row = 0; row <= camera.height; row += 48) {
+    for (int column = 0; column <= camera.width; column += 64) {
+      const Vec2& ray = rays.corner(column, row);
+      std::vector<cv::Point2d> expected;
+      cv::fisheye::projectPoints(std::vector<cv::Point3d>{{ray[0], ray[1], 1}}, expected, cv::Vec3d(), cv::Vec3d(),
+                                 cv::Matx33d(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1),
+                                 cv::Vec4d(-0.03, 0.012, -0.006, 0.001));
+      EXPECT_NEAR(expected[0].x, column - 0.5, 1e-9);
+      EXPECT_NEAR(expected[0].y, row - 0.5, 1e-9);
+      const Vec2 pixel = image_point(camera, ray);
+      EXPECT_NEAR(pixel[0], expected[0].x, 1e-9);
+      EXPECT_NEAR(pixel[1], expected[0].y, 1e-9);
+    }
+  }
+  camera.fx = camera.fy = 200;
+  EXPECT_THROW(RayMap{camera}, Error);  // beyond 83 degrees
 }
 
 TEST(Truth, RayMapInvertsTheLens) {

@@ -134,7 +134,8 @@ void detect_one(const std::string& path, const DetectOptions& options, Engine& e
   const std::string refusal = engine.pose_refusal(image.width(), image.height());
   if (!refusal.empty()) console.complain(path + ": " + refusal + " (" + options.engine.camera_file + ")");
   if (draw.wanted()) {
-    write_annotated(draw.path_for(path), image.view(), result.frame.detections, engine.config().camera);
+    write_annotated(draw.path_for(path), image.view(), result.frame.detections,
+                    engine.camera_for(image.width(), image.height()));
   }
 }
 
@@ -145,7 +146,7 @@ void run_detect(const DetectOptions& options, Console& console) {
   }
   const std::vector<std::string> paths = expand(options, console);
   DrawTarget draw(options.draw, paths.size());
-  Engine engine(open_chosen_backends(options.engine), std::move(config));
+  Engine engine(open_chosen_backends(options.engine), std::move(config), options.engine.camera_fit);
   for (const std::string& path : paths) {
     try {
       detect_one(path, options, engine, draw, console);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <locale>
+#include <map>
 #include <sstream>
 
 #include "berth/error.hpp"
@@ -51,8 +52,16 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
       ->type_name("NAME")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command.add_option("--camera", options.camera_file, "camera_info YAML; with --size, markers get a pose")
+  command
+      .add_option("--camera", options.camera_file,
+                  "camera_info or Kalibr YAML, PhotonVision JSON; with --size, markers get a pose")
       ->type_name("FILE");
+  command
+      .add_option("--camera-fit", options.camera_fit,
+                  "how images of another size came from the camera's: resize of the whole, or crop to the middle")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, CameraFit>{{"resize", CameraFit::resize}, {"crop", CameraFit::crop}}))
+      ->type_name("HOW");
   command.add_option("--size", options.size, "side of the marker's border square, metres")->type_name("METRES");
   command.add_option("--pose", options.pose, "how poses are had: least-squares, or the paper's closed form")
       ->check(CLI::IsMember({"least-squares", "paper"}))
@@ -169,12 +178,12 @@ DetectorConfig make_config(const EngineOptions& options) {
   config.max_hamming = options.max_hamming;
   if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
   if (options.pose == "paper") config.pose_method = PoseMethod::paper;
-  if (!options.camera_file.empty()) config.camera = read_camera_info(options.camera_file);
+  if (!options.camera_file.empty()) config.camera = read_camera(options.camera_file);
   return config;
 }
 
-Engine::Engine(EngineBackends backends, DetectorConfig config)
-    : backends_(std::move(backends)), config_(std::move(config)) {}
+Engine::Engine(EngineBackends backends, DetectorConfig config, CameraFit fit)
+    : backends_(std::move(backends)), config_(std::move(config)), fit_(fit) {}
 
 std::string Engine::describe() const {
   const auto named = [](Backend& backend) { return std::string(backend.name()) + " on " + backend.device().name; };
@@ -184,12 +193,27 @@ std::string Engine::describe() const {
 }
 
 std::string Engine::pose_refusal(int width, int height) const {
-  if (!config_.camera || !(config_.marker_size_m > 0)) return "";
-  if (config_.camera->width == width && config_.camera->height == height) return "";
+  if (!config_.camera || !(config_.marker_size_m > 0) || camera_for(width, height)) return "";
   const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
   return "field 'size' is " + size(width, height) + ", but the camera file's image is " +
          size(config_.camera->width, config_.camera->height) +
-         ": no pose; use images as the camera was calibrated, or a camera file for this size";
+         (fit_ == CameraFit::none
+              ? ": no pose; use images as the camera was calibrated, a camera file for this size, or say with "
+                "--camera-fit how they came from it"
+              : ", which --camera-fit cannot make of it: no pose; use images of the same shape to resize, or smaller "
+                "by "
+                "even numbers to crop");
+}
+
+std::optional<CameraModel> Engine::camera_for(int width, int height) const {
+  if (!config_.camera || (config_.camera->width == width && config_.camera->height == height)) return config_.camera;
+  if (fit_ == CameraFit::none) return std::nullopt;
+  try {
+    return fit_ == CameraFit::resize ? resized_camera(*config_.camera, width, height)
+                                     : cropped_camera(*config_.camera, width, height);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
 }
 
 Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
@@ -202,7 +226,8 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
   }
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
   DetectorConfig config = config_;
-  if (!(config.marker_size_m > 0) || !pose_refusal(image.width, image.height).empty()) config.camera.reset();
+  config.camera = camera_for(image.width, image.height);
+  if (!(config.marker_size_m > 0)) config.camera.reset();
   if (!config.camera) config.marker_size_m = 0;
   Sized sized{image.width, image.height, nullptr, nullptr};
   std::vector<Backend*> chain;

@@ -12,10 +12,14 @@
 
 namespace berth::cli {
 
+/// How images of another size than the camera's came from it.
+enum class CameraFit { none, resize, crop };
+
 /// What the command line says about the engine; empty where it says nothing.
 struct EngineOptions {
   std::vector<std::string> families;
   std::string camera_file;
+  CameraFit camera_fit = CameraFit::none;
   std::string size;
   std::string pose = "least-squares";
   std::string backend;
@@ -62,10 +66,11 @@ struct TimedResult {
   std::optional<StageDifference> difference;
 };
 
-/// Detectors for frames of any size, made when a size first comes. A camera of another size gives no pose.
+/// Detectors for frames of any size, made when a size first comes. A camera of another size gives no pose, unless it is
+/// said how it fits.
 class Engine {
  public:
-  Engine(EngineBackends backends, DetectorConfig config);
+  Engine(EngineBackends backends, DetectorConfig config, CameraFit fit = CameraFit::none);
 
   /// Detects; the result is valid until the next call. The detector of a size is warmed up by one detection outside the
   /// timing (first touch of its memory, kernels loaded).
@@ -73,6 +78,8 @@ class Engine {
 
   /// Why a frame of this size can have no pose although a camera was given; empty when all is well.
   std::string pose_refusal(int width, int height) const;
+  /// The camera for frames of this size; none where none was given or it does not fit.
+  std::optional<CameraModel> camera_for(int width, int height) const;
 
   const DetectorConfig& config() const { return config_; }
   /// The one whose results are given: it changes when a device is lost.
@@ -97,6 +104,7 @@ class Engine {
   EngineBackends backends_;
   std::size_t active_ = 0;
   DetectorConfig config_;
+  CameraFit fit_;
   /// Most recently used first.
   std::vector<Sized> detectors_;
 };

@@ -100,7 +100,7 @@ class StreamRun {
     if (!config.camera && size_given_) console_.note("no poses: --camera is missing");
     if (config.camera && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    engine_.emplace(open_chosen_backends(engine_options), std::move(config));
+    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit);
     people_ << "backend " << engine_->describe() << '\n';
   }
 
@@ -252,7 +252,8 @@ class StreamRun {
     }
     if (!options_.svg.empty()) write_svg();
     if (!options_.picture.empty() && !picture_detections_.empty()) {
-      write_annotated(options_.picture, picture_.view(), picture_detections_, engine_->config().camera);
+      write_annotated(options_.picture, picture_.view(), picture_detections_,
+                      engine_->camera_for(picture_.width(), picture_.height()));
       people_ << "picture     " << options_.picture << '\n';
     }
     people_.flush();

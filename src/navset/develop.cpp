@@ -40,7 +40,7 @@ void smear(std::vector<double>& image, int width, int height, double dx, double 
 class ToneCurve {
  public:
   explicit ToneCurve(double gamma) {
-    for (int i = 0; i <= kNodes; ++i) nodes_.push_back(255 * sim::exact_pow(static_cast<double>(i) / kNodes, gamma));
+    for (int i = 0; i <= kNodes; ++i) nodes_.push_back(255 * exact_pow(static_cast<double>(i) / kNodes, gamma));
     nodes_.push_back(nodes_.back());
   }
   double operator()(double grey) const {

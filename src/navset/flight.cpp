@@ -60,7 +60,7 @@ CameraModel Flight::camera() {
 std::string Flight::title() const { return livery_->name + ", " + name_of(kind_) + ", " + mood_; }
 
 void Flight::place(double u, FlightFrame& frame) const {
-  frame.marker_range_m = kFrom_m * sim::exact_pow(kTo_m / kFrom_m, u);
+  frame.marker_range_m = kFrom_m * exact_pow(kTo_m / kFrom_m, u);
   const double far = std::min(1.0, (frame.marker_range_m - kTo_m) / 2);
   const Vec3 direction = sim::normalized({kSwing_x * far * swing_x_.at(u), kSwing_y * far * swing_y_.at(u), 1});
   const double tilt = kTilt_rad * (0.2 + 0.8 * far);

@@ -6,7 +6,6 @@
 namespace berth::navset {
 namespace {
 
-using sim::floor_int;
 using sim::scatter;
 using sim::unit;
 

@@ -25,7 +25,7 @@ Vec3 random_direction(sim::Random& random) {
 }
 
 double log_uniform(sim::Random& random, double low, double high) {
-  return low * sim::exact_pow(high / low, random.uniform(0, 1));
+  return low * exact_pow(high / low, random.uniform(0, 1));
 }
 
 }  // namespace berth::navset

@@ -15,7 +15,7 @@ struct Rectangle {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // last ones excluded
 };
 
-int clamped_floor(double x) { return static_cast<int>(sim::floor_int(std::min(1e6, std::max(-1e6, x)))); }
+int clamped_floor(double x) { return static_cast<int>(floor_int(std::min(1e6, std::max(-1e6, x)))); }
 
 // The slopes x / z between which a sphere at (x, z) lies, as seen from the origin.
 void slopes(double x, double z, double radius, double& low, double& high) {

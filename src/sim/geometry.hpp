@@ -1,7 +1,7 @@
 #pragma once
 
+#include "exact_math.hpp"
 #include "pose_algebra.hpp"
-#include "sim/exact_math.hpp"
 
 namespace berth::sim {
 
@@ -10,11 +10,17 @@ using berth::column;
 using berth::compose;
 using berth::cross;
 using berth::dot;
+using berth::exact_cos;
+using berth::exact_exp;
+using berth::exact_log;
+using berth::exact_sin;
 using berth::inverse;
+using berth::kPi;
 using berth::length;
 using berth::Mat3;
 using berth::normalized;
 using berth::product;
+using berth::radians;
 using berth::scaled;
 using berth::small_rotation;
 using berth::transform;

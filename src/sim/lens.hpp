@@ -30,6 +30,8 @@ class RayMap {
   const Vec2& high() const { return high_; }
 
  private:
+  void set_bounds();
+
   CameraModel camera_;
   std::vector<Vec2> corners_;
   Vec2 low_ = {0, 0}, high_ = {0, 0};

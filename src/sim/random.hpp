@@ -1,7 +1,7 @@
 #pragma once
 
 #include "berth/types.hpp"
-#include "sim/exact_math.hpp"
+#include "exact_math.hpp"
 
 namespace berth::sim {
 

@@ -13,7 +13,7 @@ namespace {
 
 bool same_camera(const CameraModel& a, const CameraModel& b) {
   return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
-         a.distortion == b.distortion;
+         a.distortion == b.distortion && a.lens == b.lens;
 }
 
 // Every surface, far to near, and for each marker the place of its pattern in the list.

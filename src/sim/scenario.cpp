@@ -30,7 +30,7 @@ CameraModel read_camera(TomlReader& reader) {
     const bool absolute = file[0] == '/';
     const std::size_t slash = reader.file().find_last_of('/');
     const std::string folder = absolute || slash == std::string::npos ? "" : reader.file().substr(0, slash + 1);
-    return read_camera_info(folder + file);
+    return berth::read_camera(folder + file);
   }
   if (!reader.has("fx") && !reader.has("fy")) {
     if (width * 3 != height * 4) reader.fail("height", "use a 4:3 image with the paper's lens, or give fx, fy, cx, cy");

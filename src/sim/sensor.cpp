@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/exact_math.hpp"
+#include "exact_math.hpp"
 #include "sim/random.hpp"
 
 namespace berth::sim {

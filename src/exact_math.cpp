@@ -1,9 +1,9 @@
-#include "sim/exact_math.hpp"
+#include "exact_math.hpp"
 
 #include <cmath>
 #include <cstring>
 
-namespace berth::sim {
+namespace berth {
 namespace {
 
 constexpr double kLn2 = 0.69314718055994530942;
@@ -87,6 +87,18 @@ double exact_pow(double base, double exponent) { return base > 0 ? exact_exp(exp
 double exact_sin(double angle_rad) { return sin_shifted(angle_rad, 0); }
 double exact_cos(double angle_rad) { return sin_shifted(angle_rad, 1); }
 
+double exact_atan(double x) {
+  if (x < 0) return -exact_atan(-x);
+  if (x > 1) return (kHalfPi - exact_atan(1 / x)) + kHalfPiRest;
+  // Half the angle, twice: the series below then has 0.2 or less to deal with.
+  double t = x;
+  for (int i = 0; i < 2; ++i) t /= 1 + std::sqrt(1 + t * t);
+  const double s = t * t;
+  double sum = 0;
+  for (int n = 25; n >= 1; n -= 2) sum = 1.0 / n - s * sum;
+  return 4 * t * sum;
+}
+
 double normal_quantile(double p) {
   static constexpr double kA[] = {3.3871328727963666080e0, 1.3314166789178437745e2, 1.9715909503065514427e3,
                                   1.3731693765509461125e4, 4.5921953931549871457e4, 6.7265770927008700853e4,
@@ -123,4 +135,4 @@ double normal_quantile(double p) {
   return q < 0 ? -tail : tail;
 }
 
-}  // namespace berth::sim
+}  // namespace berth
