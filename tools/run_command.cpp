@@ -21,6 +21,7 @@ constexpr const char* kExamples = R"(Examples:
   berth model show lite.berthnet                 its layers, with their sizes and costs
   berth print-tag tag36h11 7 --size 0.08 --out tag.pdf   a marker on paper, at true size
   berth table                                    the paper's six-axis table, simulated: errors of every axis
+  berth calibrate --board aprilgrid --grid 5x7 --size 0.03 --out cam.yaml images/
   berth doctor                                   what this machine has, and what it lacks
 
 Exit codes: 0 all well; 1 verify or eval found a difference, or a flight did not dock; 2 bad input or usage.)";
@@ -46,6 +47,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
     return "berth: command line: " + std::string(error.what()) + "; see " + failed->get_display_name() + " --help\n";
   });
   int exit_code = kOk;
+  add_calibrate(app, console, exit_code);
   add_demo(app, console, exit_code);
   add_detect(app, console, exit_code);
   add_flight(app, console, exit_code);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <fstream>
 #include <map>
 #include <set>
@@ -13,6 +12,7 @@
 #include "annotate.hpp"
 #include "berth/error.hpp"
 #include "frame_json.hpp"
+#include "interrupt.hpp"
 #include "live_view.hpp"
 #include "marker_filters.hpp"
 #include "output_file.hpp"
@@ -21,27 +21,6 @@
 
 namespace berth::cli {
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-
-/// While it lives, the first SIGINT asks the stream to end; a second one has its usual effect.
-class InterruptWatch {
- public:
-  InterruptWatch() {
-    interrupted = 0;
-    previous_ = std::signal(SIGINT, [](int) {
-      interrupted = 1;
-      std::signal(SIGINT, SIG_DFL);
-    });
-  }
-  ~InterruptWatch() { std::signal(SIGINT, previous_); }
-  InterruptWatch(const InterruptWatch&) = delete;
-  InterruptWatch& operator=(const InterruptWatch&) = delete;
-  bool came() const { return interrupted != 0; }
-
- private:
-  void (*previous_)(int);
-};
 
 using MarkerKey = std::pair<std::string, int>;
 

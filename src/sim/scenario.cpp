@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "berth/error.hpp"
+#include "sim/board.hpp"
 #include "sim/body.hpp"
 #include "sim/clutter.hpp"
 #include "sim/printed_marker.hpp"
@@ -159,7 +160,11 @@ void read_target(TomlReader& reader, u64 seed, Scene& scene) {
 
   std::vector<TomlReader> markers = reader.tables("marker");
   for (TomlReader& one : markers) scene.markers.push_back(read_marker(one));
-  if (markers.empty()) add_dock_markers(scene, Pose{});
+  if (reader.has("board")) {
+    for (Surface& surface : read_board(reader.table("board"))) scene.background.push_back(std::move(surface));
+  } else if (markers.empty()) {
+    add_dock_markers(scene, Pose{});
+  }
 
   for (TomlReader& one : reader.tables("finger")) {
     const Vec2 tip = one.pair("tip", {0.2, 0}, -5, 5);
@@ -246,7 +251,7 @@ std::unique_ptr<Source> open_scenario(const std::string& path) {
 
   TomlReader path_reader = reader.table("trajectory");
   const int frames = path_reader.integer("frames", 120, 1, 1000000);
-  std::unique_ptr<Trajectory> trajectory = read_trajectory(path_reader);
+  std::unique_ptr<Trajectory> trajectory = read_trajectory(path_reader, frames);
   path_reader.finish();
   reader.finish();
   return std::make_unique<ScenarioSource>(path, std::move(scene), timing, frames, std::move(trajectory));

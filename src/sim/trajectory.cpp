@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "sim/random.hpp"
 #include "sim/toml_reader.hpp"
 
 namespace berth::sim {
@@ -132,13 +133,50 @@ class Axis final : public Trajectory {
   Vec3 position_, rotation_;
 };
 
+// A board held still before the camera, another way in each frame: as one calibrates a camera.
+class Views final : public Trajectory {
+ public:
+  Views(TomlReader& reader, int frames) : frames_(frames) {
+    range_ = reader.pair("range_m", {0.4, 0.6}, kLeastRange_m, kMostRange_m);
+    view_ = reader.pair("view", {0.25, 0.18}, 0, 5);
+    tilt_ = reader.pair("tilt_deg", {10, 40}, 0, 80);
+    roll_deg_ = reader.number("roll_deg", 15, 0, 180);
+    seed_ = static_cast<u64>(reader.integer("views_seed", 1, 0, 2147483647));
+  }
+
+  Pose body(double s, double /*time_s*/) const override {
+    const long long frame = floor_int(s * std::max(1, frames_ - 1) + 0.5);
+    Random random(seed_ + static_cast<u64>(frame));
+    const double across = random.uniform(-view_[0], view_[0]);
+    const double down = random.uniform(-view_[1], view_[1]);
+    const double range = random.uniform(range_[0], range_[1]);
+    const double tilt = random.uniform(tilt_[0], tilt_[1]);
+    // About axes all around the board, in turn: no two neighbours lean the same way.
+    const double axis = kGoldenTurn_deg * static_cast<double>(frame);
+    const double roll = random.uniform(-roll_deg_, roll_deg_);
+    Pose pose = translation(across * range, down * range, range);
+    const Mat3 lean =
+        product(rotation_deg({0, 0, axis}), product(rotation_deg({tilt, 0, 0}), rotation_deg({0, 0, -axis})));
+    pose.R = product(lean, rotation_deg({0, 0, roll}));
+    return pose;
+  }
+
+ private:
+  static constexpr double kGoldenTurn_deg = 137.50776405003785;
+  int frames_;
+  Vec2 range_, view_, tilt_;
+  double roll_deg_;
+  u64 seed_;
+};
+
 }  // namespace
 
-std::unique_ptr<Trajectory> read_trajectory(TomlReader& reader) {
-  const std::string kind = reader.choice("kind", "approach", {"approach", "rectangle", "axis"});
+std::unique_ptr<Trajectory> read_trajectory(TomlReader& reader, int frames) {
+  const std::string kind = reader.choice("kind", "approach", {"approach", "rectangle", "axis", "views"});
   std::unique_ptr<Trajectory> trajectory;
   if (kind == "approach") trajectory = std::make_unique<Approach>(reader);
   if (kind == "rectangle") trajectory = std::make_unique<Rectangle>(reader);
+  if (kind == "views") trajectory = std::make_unique<Views>(reader, frames);
   if (kind == "axis") trajectory = std::make_unique<Axis>(reader);
   return trajectory;
 }

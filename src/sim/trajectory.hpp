@@ -17,8 +17,9 @@ class Trajectory {
   virtual Pose body(double s, double time_s) const = 0;
 };
 
-/// Reads [trajectory]: kind "approach", "rectangle" or "axis" with their keys (docs/simulator.md).
-std::unique_ptr<Trajectory> read_trajectory(TomlReader& reader);
+/// Reads [trajectory] of so many frames: kind "approach", "rectangle", "axis" or "views" with their keys
+/// (docs/simulator.md).
+std::unique_ptr<Trajectory> read_trajectory(TomlReader& reader, int frames);
 
 /// The motion between two instants of one exposure, for Scene::motion.
 Motion motion_between(const Pose& before, const Pose& after);
