@@ -288,9 +288,10 @@ TEST(BoardFinder, FindsOpenCvsCharuco) {
   ASSERT_TRUE(view);
   ASSERT_EQ(view->points.size(), 20u);
   for (std::size_t i = 0; i < 20; ++i) {
+    const std::size_t column = i % 5, row = i / 5;
     EXPECT_EQ(view->points[i], i);
-    EXPECT_NEAR(view->seen_px[i][0], 19.5 + 100 * (static_cast<double>(i % 5) + 1), 0.1);
-    EXPECT_NEAR(view->seen_px[i][1], 19.5 + 100 * (static_cast<double>(i / 5) + 1), 0.1);
+    EXPECT_NEAR(view->seen_px[i][0], 119.5 + 100 * static_cast<double>(column), 0.1);
+    EXPECT_NEAR(view->seen_px[i][1], 119.5 + 100 * static_cast<double>(row), 0.1);
   }
 }
 

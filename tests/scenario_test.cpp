@@ -159,6 +159,11 @@ TEST(Scenario, ErrorsNameFileLineFieldValueAndRemedy) {
       {"[trajectory]\nkind = \"axis\"\naxis = \"z\"\nfrom = -2\n", {"'trajectory.from'", "is -2", "0.05"}},
       {"[trajectory]\nframes = 0\n", {"'trajectory.frames'", "is 0", "from 1 to"}},
       {"[trajectory]\nrange_m = 1\n", {"'trajectory.range_m'", "unknown"}},
+      {"[trajectory]\nkind = \"views\"\ntilt_deg = [10, 90]\n", {"'trajectory.tilt_deg'", "[10, 90]", "from 0 to 80"}},
+      {"[board]\nkind = \"circles\"\n", {".toml:2:", "'board.kind'", "\"circles\"", "\"charuco\""}},
+      {"[board]\nfamily = \"tag36h12\"\n", {"'board.family'", "\"tag36h12\"", "tag36h11"}},
+      {"[board]\nkind = \"chessboard\"\ncolumns = 3\n", {"'board.kind'", "3 x 6 squares", "give 4 to 100"}},
+      {"[board]\nkind = \"charuco\"\npitch_m = 0.03\n", {"'board.kind'", "too little white"}},
       {"[camera\n", {".toml:1:", "not TOML"}},
       {"", {".toml", "empty"}},
   };

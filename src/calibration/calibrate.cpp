@@ -45,7 +45,7 @@ Points points_of(const Board& board, const ViewSet& set) {
   return points;
 }
 
-const cv::TermCriteria kUntilSettled{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-12};
+const cv::TermCriteria kUntilSettled{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-9};
 
 Solution solve_brown(const Points& points, cv::Size size) {
   Solution solution;

@@ -155,8 +155,8 @@ CameraModel cropped_camera(const CameraModel& camera, int width, int height) {
   CameraModel fitted = camera;
   fitted.width = width;
   fitted.height = height;
-  fitted.cx -= left / 2;
-  fitted.cy -= top / 2;
+  fitted.cx -= 0.5 * left;
+  fitted.cy -= 0.5 * top;
   return fitted;
 }
 

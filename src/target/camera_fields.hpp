@@ -43,8 +43,8 @@ class CameraFields {
   void set_matrix(const std::string& field, CameraModel& camera) const;
 
  private:
-  CameraFields(std::string path, std::string prefix, YAML::Node node)
-      : path_(std::move(path)), prefix_(std::move(prefix)), node_(std::move(node)) {}
+  CameraFields(std::string path, std::string prefix, const YAML::Node& node)
+      : path_(std::move(path)), prefix_(std::move(prefix)), node_(node) {}
 
   std::string scalar(const YAML::Node& node, const std::string& field) const;
   double number(const std::string& field, const std::string& written) const;
