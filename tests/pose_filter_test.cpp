@@ -40,7 +40,7 @@ double normal(sim::Random& random) {
 Detection seen(const Pose& truth, sim::Random& random, double noise_px = kNoise_px) {
   const CameraModel camera = paper_camera();
   Detection marker;
-  const auto corners = pose_corners(kSide_m, 1, {});
+  const auto corners = pose_corners(kSide_m, {}, {});
   for (std::size_t i = 0; i < 4; ++i) {
     const Vec3 at = transform(truth, corners[i].point_m);
     marker.corners[i] = camera.project(at[0] / at[2], at[1] / at[2]);

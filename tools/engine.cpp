@@ -66,6 +66,12 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
   command.add_option("--pose", options.pose, "how poses are had: least-squares, or the paper's closed form")
       ->check(CLI::IsMember({"least-squares", "paper"}))
       ->capture_default_str();
+  command
+      .add_option("--corners", options.corners,
+                  "corners from the border's edges, or from a fit of the whole pattern: slower, as exact as the noise "
+                  "allows")
+      ->check(CLI::IsMember({"edges", "photometric"}))
+      ->capture_default_str();
   command.add_option("--max-hamming", options.max_hamming, "most wrong bits a code may have")
       ->type_name("N")
       ->capture_default_str();
@@ -178,6 +184,7 @@ DetectorConfig make_config(const EngineOptions& options) {
   config.max_hamming = options.max_hamming;
   if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
   if (options.pose == "paper") config.pose_method = PoseMethod::paper;
+  if (options.corners == "photometric") config.corner_method = CornerMethod::photometric;
   if (!options.camera_file.empty()) config.camera = read_camera(options.camera_file);
   return config;
 }

@@ -22,6 +22,7 @@ struct EngineOptions {
   CameraFit camera_fit = CameraFit::none;
   std::string size;
   std::string pose = "least-squares";
+  std::string corners = "edges";
   std::string backend;
   std::string device;
   int threads = 1;

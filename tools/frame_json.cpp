@@ -22,6 +22,12 @@ void add_uncertainty(const PoseUncertainty& uncertainty, Json& pose) {
 Json to_json(const Detection& detection) {
   Json json = {{"family", detection.family->name}, {"id", detection.id},           {"hamming", detection.hamming},
                {"margin", detection.margin},       {"corners", detection.corners}, {"center", detection.center}};
+  if (detection.corner_fit) {
+    json["corner_fit"] = {{"covariance_px2", detection.corner_fit->covariance_px2},
+                          {"noise", detection.corner_fit->noise},
+                          {"blur_px2", detection.corner_fit->blur_px2},
+                          {"local_levels", detection.corner_fit->local_levels}};
+  }
   if (detection.has_pose) json["pose"] = to_json(detection.pose);
   if (detection.pose_uncertainty) add_uncertainty(*detection.pose_uncertainty, json["pose"]);
   return json;

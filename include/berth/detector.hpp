@@ -29,6 +29,15 @@ enum class PoseMethod {
   paper,
 };
 
+/// How exact a marker's corners are had (docs/corners.md).
+enum class CornerMethod {
+  /// From lines through the gray-level edges of the border: on the device, next to nothing.
+  edges,
+  /// From a fit of the whole decoded pattern on the host, at about the noise's limit. Corners come with covariances.
+  /// Where the fit does not hold they are the edges'.
+  photometric,
+};
+
 struct DetectorConfig {
   /// Family names; see family_names().
   std::vector<std::string> families = {"tag36h11"};
@@ -40,7 +49,9 @@ struct DetectorConfig {
   std::optional<CameraModel> camera;
   double marker_size_m = 0;
   PoseMethod pose_method = PoseMethod::least_squares;
-  /// One standard deviation of a corner's coordinate, px: what poses' covariances go by (docs/pose.md).
+  CornerMethod corner_method = CornerMethod::edges;
+  /// One standard deviation of a corner's coordinate, px: what poses' covariances go by (docs/pose.md) where the
+  /// corners are the edges'.
   double corner_deviation_px = 0.15;
   /// Per-pixel gain of the flat-field correction, row-major, 1 = unchanged; empty for none.
   std::vector<float> flat_field;

@@ -50,8 +50,8 @@ struct FrameResult {
   int quads = 0;
   /// Run ends, contours and points of each search in turn (docs/marker-pipeline.md).
   std::array<CapacityUse, 9> capacities = {};
-  /// device: upload to download; decode; pose
-  std::array<StageTime, 3> times = {};
+  /// device: upload to download; decode; pose; corners, where the photometric fit was asked for
+  std::array<StageTime, 4> times = {};
   /// Filled only when the detector is asked for digests.
   std::vector<StageDigest> digests;
 };

@@ -55,6 +55,18 @@ struct PoseUncertainty {
   double ambiguity() const { return has_other && other_error_px > 0 ? error_px / other_error_px : has_other ? 1 : 0; }
 };
 
+/// How well a marker's corners are known that the photometric fit has found (docs/corners.md).
+struct CornerFit {
+  /// Of each corner, px²: of x, of x with y, of y. From the residuals, so model errors are in it as far as they show.
+  std::array<std::array<double, 3>, 4> covariance_px2 = {};
+  /// Standard deviation of what the model leaves, grey levels: the noise, where it holds.
+  double noise = 0;
+  /// Variance of the blur with the pixel's own square, px²: xx, xy, yy.
+  std::array<double, 3> blur_px2 = {};
+  /// Dark and light were taken block by block, because they are not smooth over the marker: a shadow's edge.
+  bool local_levels = false;
+};
+
 /// A decoded marker. Corners in the paper's order: the upright marker's upper left first, then counter-clockwise
 /// (upper left, lower left, lower right, upper right); px, pixel centres at integer coordinates.
 struct Detection {
@@ -65,6 +77,8 @@ struct Detection {
   double margin = 0;
   std::array<std::array<double, 2>, 4> corners = {};
   std::array<double, 2> center = {};
+  /// Of corners by the photometric fit; empty where it was not asked for or did not hold, and they are the edges'.
+  std::optional<CornerFit> corner_fit;
   bool has_pose = false;
   Pose pose;
   /// Of poses by least squares.

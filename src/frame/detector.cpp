@@ -14,6 +14,7 @@
 #include "target/decode.hpp"
 #include "target/marker_pose.hpp"
 #include "target/paper_p4p.hpp"
+#include "target/photometric_fit.hpp"
 
 namespace berth {
 
@@ -126,6 +127,7 @@ struct Detector::Impl {
     if (!(config.corner_deviation_px > 0)) {
       throw Error("corner_deviation_px is " + std::to_string(config.corner_deviation_px) + "; give px above 0");
     }
+    if (config.corner_method == CornerMethod::photometric) fit.emplace(config.camera, width, height);
     if (plan.frame().host() == nullptr) staging.resize(plan.geometry().frame_bytes());
     std::size_t slots = 0;
     for (const MarkerSearch& search : plan.searches()) {
@@ -173,12 +175,15 @@ struct Detector::Impl {
     for (const SearchResult& search : searches) decode(search);
     resolve_duplicates(result.detections);
     const Clock::time_point decoded = Clock::now();
+    if (fit) refine_corners();
+    const Clock::time_point refined = Clock::now();
     if (config.camera) {
       for (Detection& detection : result.detections) add_pose(detection);
     }
     const Clock::time_point posed = Clock::now();
     result.times = {StageTime{"device", ns_between(started, on_host)},
-                    StageTime{"decode", ns_between(on_host, decoded)}, StageTime{"pose", ns_between(decoded, posed)}};
+                    StageTime{"decode", ns_between(on_host, decoded)}, StageTime{"pose", ns_between(refined, posed)},
+                    StageTime{fit ? "corners" : "", ns_between(decoded, refined)}};
     result.status = result.detections.empty() ? FrameStatus::no_target : FrameStatus::ok;
     for (std::size_t i = 0; i < searches.size(); ++i) searches[i].note_capacities(&result.capacities[3 * i]);
     for (const CapacityUse& use : result.capacities) {
@@ -206,6 +211,14 @@ struct Detector::Impl {
     }
   }
 
+  void refine_corners() {
+    const MarkerGeometry& g = plan.geometry();
+    const View2D<const u8> image{frame(), g.width, g.height, g.padded_width};
+    for (Detection& d : result.detections) {
+      if (!fit->refine(image, *d.family, d.id, d.corners, d.corner_fit.emplace())) d.corner_fit.reset();
+    }
+  }
+
   void add_pose(Detection& d) const {
     const CameraModel& camera = *config.camera;
     d.pose_uncertainty.reset();
@@ -213,8 +226,8 @@ struct Detector::Impl {
       d.has_pose = paper_p4p(camera, config.marker_size_m, d.corners, d.pose);
       return;
     }
-    d.has_pose = marker_pose(camera, config.marker_size_m, config.corner_deviation_px, d.corners, d.pose,
-                             d.pose_uncertainty.emplace());
+    d.has_pose = marker_pose(camera, config.marker_size_m, d.corners, corner_covariances(d, config.corner_deviation_px),
+                             d.pose, d.pose_uncertainty.emplace());
     if (!d.has_pose) d.pose_uncertainty.reset();
   }
 
@@ -242,6 +255,7 @@ struct Detector::Impl {
   Decoder decoder;
   MarkerPlan plan;
   std::unique_ptr<Stream> stream;
+  std::optional<PhotometricFit> fit;
   std::vector<u8> staging;  // empty where the host reaches the device's memory
   std::vector<SearchResult> searches;
   std::vector<Corners> refused;  // candidates of the frame that hold no marker

@@ -23,22 +23,34 @@ bool shows_front(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0; 
 
 }  // namespace
 
-std::array<PoseCorner, 4> pose_corners(double size_m, double deviation_px,
-                                       const std::array<std::array<double, 2>, 4>& corners_px) {
-  const double h = size_m / 2, variance = deviation_px * deviation_px;
+CornerCovariances corner_covariances(const Detection& marker, double deviation_px) {
+  if (marker.corner_fit) return marker.corner_fit->covariance_px2;
+  CornerCovariances covariances;
+  covariances.fill({deviation_px * deviation_px, 0, deviation_px * deviation_px});
+  return covariances;
+}
+
+std::array<PoseCorner, 4> pose_corners(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
+                                       const CornerCovariances& covariances_px2) {
+  const double h = size_m / 2;
   const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
   std::array<PoseCorner, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
-    corners[i] = {{place[i][0], place[i][1], 0}, corners_px[i], {variance, 0, variance}};
+    corners[i] = {{place[i][0], place[i][1], 0}, corners_px[i], covariances_px2[i]};
   }
   return corners;
 }
 
 bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
                  const std::array<std::array<double, 2>, 4>& corners_px, Pose& pose, PoseUncertainty& uncertainty) {
+  return marker_pose(camera, size_m, corners_px, corner_covariances({}, deviation_px), pose, uncertainty);
+}
+
+bool marker_pose(const CameraModel& camera, double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
+                 const CornerCovariances& covariances_px2, Pose& pose, PoseUncertainty& uncertainty) {
   std::array<Pose, 2> starts;
   const int count = planar_poses(camera, size_m, corners_px, starts);
-  const std::array<PoseCorner, 4> corners = pose_corners(size_m, deviation_px, corners_px);
+  const std::array<PoseCorner, 4> corners = pose_corners(size_m, corners_px, covariances_px2);
   std::array<RefinedPose, 2> refined;
   std::size_t found = 0;
   for (int k = 0; k < count; ++k) {

@@ -102,7 +102,7 @@ struct PoseFilter::Impl {
 
   /// The frame's planar poses without any past, each at that cost and what its corners are off.
   void start(const Detection& marker, double cost) {
-    const auto corners = pose_corners(config.marker_size_m, config.corner_deviation_px, marker.corners);
+    const auto corners = corners_of(marker);
     const Pose* poses[] = {&marker.pose, other_of(marker)};
     for (const Pose* pose : poses) {
       RefinedPose refined;
@@ -122,7 +122,7 @@ struct PoseFilter::Impl {
 
   /// Each way goes on to each pose that the frame's corners and its past allow.
   void go_on(const Detection& marker) {
-    const auto corners = pose_corners(config.marker_size_m, config.corner_deviation_px, marker.corners);
+    const auto corners = corners_of(marker);
     for (std::size_t k = 0; k < way_count; ++k) {
       PosePrior prior{ways[k].motion.pose, {}};
       if (!invert<6>(ways[k].motion.pose_covariance, prior.information)) continue;
@@ -143,6 +143,10 @@ struct PoseFilter::Impl {
         if (absorb(refined, way.motion)) keep(way);
       }
     }
+  }
+
+  std::array<PoseCorner, 4> corners_of(const Detection& marker) const {
+    return pose_corners(config.marker_size_m, marker.corners, corner_covariances(marker, config.corner_deviation_px));
   }
 
   static const Pose* other_of(const Detection& marker) {

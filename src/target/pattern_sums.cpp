@@ -1,0 +1,153 @@
+#include "target/pattern_sums.hpp"
+
+#include <algorithm>
+
+namespace berth {
+namespace {
+
+constexpr int kModule = 1 << 18;
+constexpr int kNone = 1 << 20;
+
+// Where a pixel lies in a block's channels: quarter by quarter.
+constexpr int slot(int column, int row) { return 32 * (row / 4) + 16 * (column / 4) + 4 * (row % 4) + column % 4; }
+
+struct Place {
+  int u, v;  // q18
+};
+
+// |coefficient of a linear term| · 4 + … stays below 2^31 while a block is less than 512 modules wide.
+Place place_of(const BlockModel& m, int dx, int dy) {
+  const auto at = [&](const std::array<int, 6>& q) {
+    return (q[0] + q[1] * dx + q[2] * dy + q[3] * (dx * dx) + q[4] * (dx * dy) + q[5] * (dy * dy)) >> 4;
+  };
+  return {at(m.u), at(m.v)};
+}
+
+// The edge at `distance` (q18 modules) before the pixel. |distance| is cut at `reach`, so the product stays below
+// 4 · 2^26.
+const EdgePoint& edge_at(const EdgeProfile& profile, int distance, int reach, int per_module) {
+  constexpr int kShift = 18 + 8 - EdgeProfile::kPerDeviation_bits;
+  constexpr int kMost = EdgeProfile::kReach << EdgeProfile::kPerDeviation_bits;
+  const int cut = std::min(reach, std::max(-reach, distance));
+  const int t = (cut * per_module + (1 << (kShift - 1))) >> kShift;
+  return profile.at(std::min(kMost, std::max(-kMost, t)));
+}
+
+struct Seen {
+  int level, slope_u, slope_v, spread_u, spread_v, twist;  // q12
+};
+
+// The pattern about a pixel at (fu, fv) of its module, q18: edges at its left and right, above and below it. Each row
+// of three modules is a profile along u; profiles along v blend the rows. Products are q28 in 32 bits.
+Seen look(const PatternCell& cell, const EdgeProfile& profile, const BlockModel& m, int fu, int fv) {
+  const EdgePoint& left = edge_at(profile, fu, m.reach_u, m.per_module_u);
+  const EdgePoint& right = edge_at(profile, fu - kModule, m.reach_u, m.per_module_u);
+  const EdgePoint& above = edge_at(profile, fv, m.reach_v, m.per_module_v);
+  const EdgePoint& below = edge_at(profile, fv - kModule, m.reach_v, m.per_module_v);
+  int level[3], slope[3], spread[3];
+  for (std::size_t j = 0; j < 3; ++j) {
+    const int middle = cell.middle[j], end = cell.right[j];
+    level[j] = cell.left[j] * 16384 + middle * left.level + end * right.level;
+    slope[j] = middle * left.slope + end * right.slope;
+    spread[j] = middle * left.spread + end * right.spread;
+  }
+  const auto blend = [&](const int* row) {
+    return row[0] * 16384 + above.level * (row[1] - row[0]) + below.level * (row[2] - row[1]);
+  };
+  const auto change = [&](int at_above, int at_below, const int* row) {
+    return at_above * (row[1] - row[0]) + at_below * (row[2] - row[1]);
+  };
+  constexpr int kHalf = 1 << 15;
+  Seen seen;
+  const int twist = (change(above.slope, below.slope, slope) + kHalf) >> 16;
+  const int second = (change(above.spread, below.spread, spread) + kHalf) >> 16;
+  seen.twist = twist + ((m.correlation * second + 2048) >> 12);
+  seen.level = ((blend(level) + kHalf) >> 16) + ((m.correlation * twist + m.half_square * second + 2048) >> 12);
+  seen.slope_u = (blend(slope) + kHalf) >> 16;
+  seen.slope_v = (change(above.slope, below.slope, level) + kHalf) >> 16;
+  seen.spread_u = (blend(spread) + kHalf) >> 16;
+  seen.spread_v = (change(above.spread, below.spread, level) + kHalf) >> 16;
+  return seen;
+}
+
+}  // namespace
+
+void fill_channels(View2D<const u8> image, const PatternCells& cells, const EdgeProfile& profile, const BlockModel& m,
+                   int row_step, BlockChannels& channels) {
+  for (auto& channel : channels.values) channel.fill(0);
+  channels.pixels = channels.on_edges = channels.saturated = channels.outliers = 0;
+  channels.pairs = channels.pair_products = 0;
+  for (int dy = -4; dy < 4; dy += row_step) {
+    if (m.y + dy >= image.height) break;
+    const u8* const row = image.row(m.y + dy);
+    int before = kNone;
+    for (int dx = -4; dx < 4; ++dx) {
+      const int left_residual = before;
+      before = kNone;
+      if (m.x + dx >= image.width) break;
+      const Place at = place_of(m, dx, dy);
+      if (at.u < m.u_first || at.u >= m.u_last || at.v < m.v_first || at.v >= m.v_last) continue;
+      const PatternCell& cell = cells.at(at.u >> 18, at.v >> 18);
+      if (cell.kind == PatternCell::kUnknown) continue;
+      const int grey = row[m.x + dx];
+      if (grey == 0 || grey == 255) {
+        ++channels.saturated;
+        continue;
+      }
+      Seen seen{};
+      if (cell.kind == PatternCell::kEven) {
+        seen.level = cell.left[0] * 4096;
+      } else {
+        seen = look(cell, profile, m, at.u & (kModule - 1), at.v & (kModule - 1));
+      }
+      const int tone = (seen.level * (4096 - seen.level) + 2048) >> 12;
+      const int shown = seen.level + ((m.tone * tone + 2048) >> 12);
+      const int dark = (m.dark[0] + m.dark[1] * dx + m.dark[2] * dy) >> 8;
+      const int contrast = (m.contrast[0] + m.contrast[1] * dx + m.contrast[2] * dy) >> 8;
+      const int residual = grey * 32 - dark - ((contrast * shown + 2048) >> 12);
+      if (residual > m.most_residual || residual < -m.most_residual) {
+        ++channels.outliers;
+        continue;
+      }
+      ++channels.pixels;
+      before = residual;
+      if (left_residual != kNone) {
+        ++channels.pairs;
+        channels.pair_products += left_residual * residual;
+      }
+      const bool on_edge = (seen.slope_u | seen.slope_v) != 0;
+      channels.on_edges += on_edge ? 1 : 0;
+      const std::size_t i = static_cast<std::size_t>(slot(dx + 4, dy + 4));
+      const auto put = [&](Channel channel, int value) {
+        channels.values[channel][i] = static_cast<std::int16_t>(value);
+      };
+      put(kOne, 1);
+      put(kLevel, shown);
+      put(kResidual, residual);
+      if (!on_edge) continue;
+      put(kTone, tone);
+      // The tone curve's own steepness here.
+      const int steep = 4096 + ((m.tone * (4096 - 2 * seen.level) + 2048) >> 12);
+      const auto steeper = [&](int value) { return (value * steep + 2048) >> 12; };
+      put(kSlopeU, steeper(seen.slope_u));
+      put(kSlopeV, steeper(seen.slope_v));
+      put(kSpreadU, steeper(seen.spread_u));
+      put(kSpreadV, steeper(seen.spread_v));
+      put(kTwist, steeper(seen.twist));
+    }
+  }
+}
+
+void sum_products(const BlockChannels& channels, int first, int count, ChannelSums& sums) {
+  for (std::size_t a = 0; a < kChannels; ++a) {
+    for (std::size_t b = a; b < kChannels; ++b) {
+      const std::int16_t* const p = channels.values[a].data() + first;
+      const std::int16_t* const q = channels.values[b].data() + first;
+      std::int32_t sum = 0;
+      for (int i = 0; i < count; ++i) sum += static_cast<std::int32_t>(p[i]) * q[i];
+      sums[a][b] = sum;
+    }
+  }
+}
+
+}  // namespace berth

@@ -1,0 +1,226 @@
+#include "target/photometric_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "target/fit_normal.hpp"
+#include "target/fit_pass.hpp"
+
+namespace berth {
+namespace {
+
+constexpr int kMostPasses = 10;
+// Passes after which levels that are not smooth are taken for what keeps the steps from ending.
+constexpr int kPatience = 4;
+// A step below this, or below this share of what the noise leaves open, is the last.
+constexpr double kLeastStep_px = 0.01;
+constexpr double kLeastStepShare = 0.25;
+// Smaller markers have no pixels to spare for the first passes, px.
+constexpr double kSmall_px = 48;
+// Steps beyond are no refinement, px; nor are corners further from where they began than this, modules.
+constexpr double kMostStep_px = 3;
+constexpr double kMostChange_modules = 0.75;
+
+// Neighbouring residuals that agree this much are not noise: the levels are not smooth, as at the edge of a shadow.
+// Fits that hold have less than 0.35, those across a shadow more than 0.4 (docs/corners.md).
+constexpr double kMostCorrelation = 0.35;
+
+// Expected of what the pixels may not tell: no bent tone curve, the same blur in all directions, give or take this.
+constexpr double kToneDeviation = 0.3;
+constexpr double kBlurDeviation_px2 = 0.5;
+
+// Residuals beyond this are not of the marker (a glint, a cable), in standard deviations and at least in grey levels.
+constexpr double kMostDeviations = 5;
+constexpr double kLeastLimit = 16, kMostLimit = 127;
+constexpr double kMostLevel = 1024;
+constexpr double kLeastContrast = 4;
+constexpr double kMostTone = 0.9;
+constexpr double kLeastNoise = 0.1;  // grey levels²: about what rounding to integers makes
+
+// The paper's order to clockwise and back: upper left, lower left, lower right, upper right.
+Corners turned_round(const Corners& corners) { return {corners[0], corners[3], corners[2], corners[1]}; }
+
+// Moves levels and tone curve; false where they are out of all bounds.
+bool move_levels(const FitVector& step, FitState& state) {
+  bool sound = true;
+  for (std::size_t k = 0; k < 3; ++k) state.dark[k] += step[kDark + k];
+  for (std::size_t k = 0; k < 6; ++k) state.contrast[k] += step[kContrast + k];
+  for (const double level : state.dark) sound = sound && std::fabs(level) < kMostLevel;
+  for (const double level : state.contrast) sound = sound && std::fabs(level) < kMostLevel;
+  state.tone = std::min(kMostTone, std::max(-kMostTone, state.tone + step[kToneCurve]));
+  return sound && state.contrast[0] > kLeastContrast;
+}
+
+// Moves the blur by as much of the step as leaves it an ellipse that is neither flat nor much smaller than before.
+void move_blur(const FitVector& step, std::array<double, 3>& blur) {
+  constexpr double kLeast_px2 = 0.03, kMostShrink = 0.4, kMostFlat = 0.8;
+  double share = 1;
+  for (int attempt = 0; attempt < 6; ++attempt, share /= 2) {
+    std::array<double, 3> next;
+    for (std::size_t k = 0; k < 3; ++k) next[k] = blur[k] + share * step[kBlur + k];
+    if (!(next[0] > std::max(kLeast_px2, kMostShrink * blur[0]))) continue;
+    if (!(next[2] > std::max(kLeast_px2, kMostShrink * blur[2]))) continue;
+    if (!(next[1] * next[1] < kMostFlat * next[0] * next[2])) continue;
+    blur = next;
+    return;
+  }
+}
+
+// How the corners, clockwise, depend on the pattern's displacement: px by half sides.
+using FieldToCorners = std::array<std::array<double, 8>, 8>;
+
+FieldToCorners corners_of_field(const MarkerMap& map, double border) {
+  FieldToCorners result;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double a = i == 1 || i == 2 ? 1 : -1, b = i >= 2 ? 1 : -1;
+    const double half = border / 2;
+    std::array<double, 4> d{};
+    map.at((a + 1) * half, (b + 1) * half, d);
+    const double field_u[8] = {1, a, b, 0, 0, 0, 1, a * b}, field_v[8] = {0, 0, 0, 1, a, b, a * b, 1};
+    for (std::size_t k = 0; k < 8; ++k) {
+      result[2 * i][k] = (d[0] * field_u[k] + d[1] * field_v[k]) * half;
+      result[2 * i + 1][k] = (d[2] * field_u[k] + d[3] * field_v[k]) * half;
+    }
+  }
+  return result;
+}
+
+// Covariance of two corner coordinates, per grey level² of noise.
+double covariance(const FieldToCorners& corners, const FitMatrix& inverse, std::size_t i, std::size_t j) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 8; ++k) {
+    double with = 0;
+    for (std::size_t l = 0; l < 8; ++l) with += inverse[(kField + k) * kUnknowns + kField + l] * corners[j][l];
+    sum += corners[i][k] * with;
+  }
+  return sum;
+}
+
+double side_of(const Corners& corners) {
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double dx = corners[(i + 1) & 3][0] - corners[i][0], dy = corners[(i + 1) & 3][1] - corners[i][1];
+    sum += std::sqrt(dx * dx + dy * dy) / 4;
+  }
+  return sum;
+}
+
+double farthest(const Corners& a, const Corners& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double dx = a[i][0] - b[i][0], dy = a[i][1] - b[i][1];
+    most = std::max(most, std::sqrt(dx * dx + dy * dy));
+  }
+  return most;
+}
+
+// A straight tone curve and a round blur, as far as the pixels do not tell otherwise.
+void add_priors(const FitState& state, double noise, FitNormal& normal) {
+  FitVector tone{}, mixed{}, difference{};
+  tone[kToneCurve] = mixed[kBlur + 1] = difference[kBlur] = 1;
+  difference[kBlur + 2] = -1;
+  const double blur_weight = noise / (kBlurDeviation_px2 * kBlurDeviation_px2);
+  normal.add_prior(tone, state.tone, noise / (kToneDeviation * kToneDeviation));
+  normal.add_prior(mixed, state.blur[1], blur_weight);
+  normal.add_prior(difference, state.blur[0] - state.blur[2], blur_weight);
+}
+
+// Solves a pass' normal equations and moves the state. Returns false where the step leads nowhere.
+class Step {
+ public:
+  Step(const FitPass& pass, double border, FitState& state) : pass_(pass), border_(border), state_(state) {}
+
+  bool take() {
+    FitNormal normal = pass_.normal;
+    noise_ = std::max(kLeastNoise, normal.squares() / pass_.pixels);
+    add_priors(state_, noise_, normal);
+    FitVector step;
+    FitMatrix inverse;
+    if (!normal.solve(step, inverse) || !move_levels(step, state_)) return false;
+    move_blur(step, state_.blur);
+    const FieldToCorners corners = corners_of_field(pass_.map, border_);
+    const Corners before = state_.corners;
+    double variances = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        for (std::size_t k = 0; k < 8; ++k) state_.corners[i][axis] += corners[2 * i + axis][k] * step[kField + k];
+      }
+      const double xx = noise_ * covariance(corners, inverse, 2 * i, 2 * i);
+      const double xy = noise_ * covariance(corners, inverse, 2 * i, 2 * i + 1);
+      const double yy = noise_ * covariance(corners, inverse, 2 * i + 1, 2 * i + 1);
+      covariance_px2_[i] = {xx, xy, yy};
+      variances += xx + yy;
+    }
+    moved_px_ = farthest(before, state_.corners);
+    deviation_px_ = std::sqrt(variances / 4);
+    return moved_px_ < kMostStep_px;
+  }
+
+  bool is_last() const { return moved_px_ < std::max(kLeastStep_px, kLeastStepShare * deviation_px_); }
+  /// Variance of a residual, grey levels².
+  double noise() const { return noise_; }
+  const std::array<std::array<double, 3>, 4>& covariance_px2() const { return covariance_px2_; }
+
+ private:
+  const FitPass& pass_;
+  double border_;
+  FitState& state_;
+  double noise_ = 0, moved_px_ = 0, deviation_px_ = 0;
+  std::array<std::array<double, 3>, 4> covariance_px2_;
+};
+
+}  // namespace
+
+bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, int id, Corners& corners,
+                            CornerFit& fit) {
+  cells_.set(family, id);
+  FitState state;
+  state.corners = turned_round(corners);
+  state.side_px = side_of(state.corners);
+  for (const auto& corner : state.corners) {
+    for (std::size_t axis = 0; axis < 2; ++axis) state.middle[axis] += corner[axis] / 4;
+  }
+  const FitScene scene{image, lens_, profile_, cells_, static_cast<double>(family.border_width)};
+
+  const bool small = state.side_px < kSmall_px;
+  // Levels alone, from every fourth row; from mid-grey, so that no residual is beyond 128.
+  state.dark[0] = 128;
+  FitPass pass(Tones::smooth);
+  FitVector step;
+  if (!pass.run(scene, state, small ? 1 : 4) || !pass.normal.solve_levels(step) || !move_levels(step, state))
+    return false;
+
+  Tones tones = Tones::smooth;
+  state.most_residual = kMostLimit;
+  for (int k = 0; k < kMostPasses; ++k) {
+    // The first steps are long and need not be exact.
+    const int row_step = k == 0 && !small ? 2 : 1;
+    pass = FitPass(tones);
+    if (!pass.run(scene, state, row_step)) return false;
+    Step next(pass, scene.border, state);
+    if (!next.take()) return false;
+    if (farthest(state.corners, turned_round(corners)) * scene.border > kMostChange_modules * state.side_px)
+      return false;
+    const bool last = next.is_last() && row_step == 1;
+    if (tones == Tones::smooth && (last || k >= kPatience) && pass.correlation() > kMostCorrelation) {
+      tones = Tones::local;
+      state.most_residual = kMostLimit;
+      continue;
+    }
+    if (last) {
+      corners = turned_round(state.corners);
+      const auto& covariances = next.covariance_px2();
+      fit.covariance_px2 = {covariances[0], covariances[3], covariances[2], covariances[1]};
+      fit.noise = std::sqrt(next.noise());
+      fit.blur_px2 = state.blur;
+      fit.local_levels = tones == Tones::local;
+      return true;
+    }
+    if (tones == Tones::smooth) {
+      state.most_residual = std::min(kMostLimit, std::max(kLeastLimit, kMostDeviations * std::sqrt(next.noise())));
+    }
+  }
+  return false;
+}
+
+}  // namespace berth
