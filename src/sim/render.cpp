@@ -60,13 +60,51 @@ double visible_share(const Scene& scene, const std::vector<Layer>& layers, std::
   return static_cast<double>(seen) / (kVisiblePoints * kVisiblePoints);
 }
 
+CameraModel magnified(CameraModel camera, int factor) {
+  camera.width *= factor;
+  camera.height *= factor;
+  camera.fx *= factor;
+  camera.fy *= factor;
+  // Pixel centres are at integers: scaling is about the image's corner, (-1/2, -1/2).
+  camera.cx = (camera.cx + 0.5) * factor - 0.5;
+  camera.cy = (camera.cy + 0.5) * factor - 0.5;
+  return camera;
+}
+
+// Means over squares of factor × factor.
+std::vector<double> binned(const std::vector<double>& fine, int width, int height, int factor) {
+  std::vector<double> result;
+  result.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      double sum = 0;
+      for (int i = 0; i < factor * factor; ++i) {
+        const std::size_t row = static_cast<std::size_t>(y * factor + i / factor);
+        sum += fine[row * static_cast<std::size_t>(width * factor) + static_cast<std::size_t>(x * factor + i % factor)];
+      }
+      result.push_back(sum / (factor * factor));
+    }
+  }
+  return result;
+}
+
 }  // namespace
+
+Renderer::Renderer(const CameraModel& camera, int fineness)
+    : fineness_(fineness), rays_(camera), fine_rays_(fineness > 1 ? RayMap(magnified(camera, fineness)) : rays_) {}
 
 GrayImage Renderer::render(const Scene& scene) const {
   if (!same_camera(scene.camera, rays_.camera())) {
     throw Error("simulator: the scene's camera is not the renderer's: make a Renderer for each camera");
   }
-  return sensor_.expose(scene.sensor, rays_, paint(scene, drawn(scene).surfaces, rays_), scene.seed);
+  std::vector<double> radiance = paint(scene, drawn(scene).surfaces, fine_rays_);
+  if (fineness_ == 1) return sensor_.expose(scene.sensor, rays_, std::move(radiance), scene.seed);
+  const CameraModel& fine = fine_rays_.camera();
+  disc_blur(radiance, fine.width, fine.height, fineness_ * scene.sensor.defocus_px);
+  gaussian_blur(radiance, fine.width, fine.height, fineness_ * scene.sensor.blur_sigma_px);
+  Sensor sensor = scene.sensor;
+  sensor.blur_sigma_px = sensor.defocus_px = 0;
+  return sensor_.expose(sensor, rays_, binned(radiance, camera().width, camera().height, fineness_), scene.seed);
 }
 
 GrayImage render(const Scene& scene) { return Renderer(scene.camera).render(scene); }
