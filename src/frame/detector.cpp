@@ -215,7 +215,14 @@ struct Detector::Impl {
     const MarkerGeometry& g = plan.geometry();
     const View2D<const u8> image{frame(), g.width, g.height, g.padded_width};
     for (Detection& d : result.detections) {
-      if (!fit->refine(image, *d.family, d.id, d.corners, d.corner_fit.emplace())) d.corner_fit.reset();
+      if (!fit->refine(image, *d.family, d.id, d.corners, d.corner_fit.emplace())) {
+        d.corner_fit.reset();
+        continue;
+      }
+      QuadMap map;
+      if (map.set({d.corners[0], d.corners[3], d.corners[2], d.corners[1]}, 1, 0)) {
+        map.at(0.5, 0.5, d.center[0], d.center[1]);
+      }
     }
   }
 
