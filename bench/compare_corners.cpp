@@ -1,5 +1,5 @@
-// Corners of Berth's two grades, libapriltag and OpenCV on the same frames in the same run, beside the Cramér-Rao bound:
-// 2-D RMS px against the simulator's truth.
+// Corners of Berth's two grades, libapriltag and OpenCV on the same frames in the same run, beside the Cramér-Rao
+// bound: 2-D RMS px against the simulator's truth.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -12,10 +12,10 @@
 #include "berth/detector.hpp"
 #include "corner_bound.hpp"
 #include "engines.hpp"
+#include "exact_math.hpp"
 #include "score.hpp"
 #include "sim/close_up.hpp"
 #include "sim/corpus.hpp"
-#include "sim/exact_math.hpp"
 #include "sim/render.hpp"
 #include "target/photometric_fit.hpp"
 
@@ -35,8 +35,8 @@ struct Case {
   int fineness = 4;
 };
 
-Case close_up(const std::string& name, const sim::CloseUp& what, const std::function<void(sim::Scene&, int)>& change = {},
-              bool has_bound = false) {
+Case close_up(const std::string& name, const sim::CloseUp& what,
+              const std::function<void(sim::Scene&, int)>& change = {}, bool has_bound = false) {
   return {name,
           [=](int i) {
             sim::Scene scene = sim::close_up_scene(paper_camera(), what, i);

@@ -110,8 +110,7 @@ struct Bound {
 
 // The numbers to reach, 2-D RMS: blur sigma 0.6 px, tilt up to 35 degrees, the paper's lens.
 TEST(PhotometricFit, IsAtTheNoiseBound) {
-  for (const Bound& bound :
-       {Bound{20, 2, 0.018}, {40, 2, 0.0095}, {80, 2, 0.0065}, {80, 8, 0.025}, {160, 2, 0.0045}}) {
+  for (const Bound& bound : {Bound{20, 2, 0.018}, {40, 2, 0.0095}, {80, 2, 0.0065}, {80, 8, 0.025}, {160, 2, 0.0045}}) {
     const Errors errors = measure({bound.side_px, bound.noise}, bound.side_px < 100 ? 24 : 8);
     EXPECT_EQ(errors.fitted, errors.found) << bound.side_px;
     EXPECT_LT(errors.rms_px(), bound.rms_px) << bound.side_px << " px, noise " << bound.noise;

@@ -1,6 +1,6 @@
 #include "sim/close_up.hpp"
 
-#include "sim/exact_math.hpp"
+#include "exact_math.hpp"
 #include "sim/random.hpp"
 
 namespace berth::sim {
