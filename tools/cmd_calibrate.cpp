@@ -119,7 +119,7 @@ class Gathering {
   const ViewSet& run(Source& source) {
     LiveView live(console_.out(), console_.out_is_terminal(), source.size());
     const InterruptWatch interrupt;
-    while (!interrupt.came()) {
+    while (!interrupt.came() && !full_) {
       std::optional<SourceFrame> frame;
       try {
         frame = source.next();
@@ -169,6 +169,7 @@ class Gathering {
         ++repeated_;
         return "like an earlier one";
       case ViewSet::Verdict::full:
+        full_ = true;
         break;
     }
     return "enough views";
@@ -182,6 +183,7 @@ class Gathering {
   std::optional<BoardFinder> finder_;
   std::size_t frames_ = 0;
   int without_ = 0, repeated_ = 0;
+  bool full_ = false;
 };
 
 int refuse(const std::vector<std::string>& objections, Console& console) {

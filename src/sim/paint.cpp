@@ -293,6 +293,11 @@ std::vector<double> paint(const Scene& scene, const std::vector<Surface>& surfac
   const int width = rays.camera().width, height = rays.camera().height;
   double nearest = 10;
   for (const SceneMarker& marker : scene.markers) nearest = std::min(nearest, marker.pose.t[2]);
+  if (scene.markers.empty()) {  // a board, which is no marker, must not blur in coarse steps
+    for (const Surface& surface : surfaces) {
+      if (surface.fine) nearest = std::min(nearest, surface.pose.t[2]);
+    }
+  }
   const double motion = motion_px(rays.camera(), scene.motion, nearest);
   // An odd number, so that the middle one is mid-exposure; steps of a pixel are not seen, since each
   // instant is itself averaged over the pixel.
