@@ -37,36 +37,78 @@ struct Seen {
   int level, slope_u, slope_v, spread_u, spread_v, twist;  // q12
 };
 
-// The pattern about a pixel at (fu, fv) of its module, q18: edges at its left and right, above and below it. Each row
-// of three modules is a profile along u; profiles along v blend the rows. Products are q28 in 32 bits.
-Seen look(const PatternCell& cell, const EdgeProfile& profile, const BlockModel& m, int fu, int fv) {
-  const EdgePoint& left = edge_at(profile, fu, m.reach_u, m.per_module_u);
-  const EdgePoint& right = edge_at(profile, fu - kModule, m.reach_u, m.per_module_u);
-  const EdgePoint& above = edge_at(profile, fv, m.reach_v, m.per_module_v);
-  const EdgePoint& below = edge_at(profile, fv - kModule, m.reach_v, m.per_module_v);
-  int level[3], slope[3], spread[3];
-  for (std::size_t j = 0; j < 3; ++j) {
-    const int middle = cell.middle[j], end = cell.right[j];
-    level[j] = cell.left[j] * 16384 + middle * left.level + end * right.level;
-    slope[j] = middle * left.slope + end * right.slope;
-    spread[j] = middle * left.spread + end * right.spread;
+// Three modules in a row under the blur, q14.
+struct Rise {
+  int level, slope, spread;
+};
+
+// The two edges of a pixel's module along one axis.
+struct Edges {
+  // `at`: place in the module, q18.
+  Edges(const EdgeProfile& profile, int at, int reach, int per_module)
+      : before(edge_at(profile, at, reach, per_module)), after(edge_at(profile, at - kModule, reach, per_module)) {}
+  static bool far(int at, int reach) { return at >= reach && kModule - at >= reach; }
+  Rise across(int first, int middle, int last) const {
+    return {first * 16384 + middle * before.level + last * after.level, middle * before.slope + last * after.slope,
+            middle * before.spread + last * after.spread};
   }
-  const auto blend = [&](const int* row) {
-    return row[0] * 16384 + above.level * (row[1] - row[0]) + below.level * (row[2] - row[1]);
+
+  const EdgePoint& before;
+  const EdgePoint& after;
+};
+
+int q12(int value_q14) { return (value_q14 + 2) >> 2; }
+int product_q12(int value_q28) { return (value_q28 + (1 << 15)) >> 16; }
+
+// The pattern near a corner of a module: each row of three is a profile along u, profiles along v blend the rows.
+// Products are q28 in 32 bits: |level| <= 2^14, |slope| and |spread| < 2^13.
+Seen look_at_corner(const PatternCell& cell, const Edges& along_u, const Edges& along_v, const BlockModel& m) {
+  Rise rows[3];
+  for (std::size_t j = 0; j < 3; ++j) rows[j] = along_u.across(cell.left[j], cell.middle[j], cell.right[j]);
+  const EdgePoint& above = along_v.before;
+  const EdgePoint& below = along_v.after;
+  const auto blend = [&](int Rise::*part) {
+    return product_q12(rows[0].*part * 16384 + above.level * (rows[1].*part - rows[0].*part) +
+                       below.level * (rows[2].*part - rows[1].*part));
   };
-  const auto change = [&](int at_above, int at_below, const int* row) {
-    return at_above * (row[1] - row[0]) + at_below * (row[2] - row[1]);
+  const auto change = [&](int at_above, int at_below, int Rise::*part) {
+    return product_q12(at_above * (rows[1].*part - rows[0].*part) + at_below * (rows[2].*part - rows[1].*part));
   };
-  constexpr int kHalf = 1 << 15;
+  // A correlated normal distribution of two variables, to the second power of the correlation.
+  const int first = change(above.slope, below.slope, &Rise::slope);
+  const int second = change(above.spread, below.spread, &Rise::spread);
   Seen seen;
-  const int twist = (change(above.slope, below.slope, slope) + kHalf) >> 16;
-  const int second = (change(above.spread, below.spread, spread) + kHalf) >> 16;
-  seen.twist = twist + ((m.correlation * second + 2048) >> 12);
-  seen.level = ((blend(level) + kHalf) >> 16) + ((m.correlation * twist + m.half_square * second + 2048) >> 12);
-  seen.slope_u = (blend(slope) + kHalf) >> 16;
-  seen.slope_v = (change(above.slope, below.slope, level) + kHalf) >> 16;
-  seen.spread_u = (blend(spread) + kHalf) >> 16;
-  seen.spread_v = (change(above.spread, below.spread, level) + kHalf) >> 16;
+  seen.level = blend(&Rise::level) + ((m.correlation * first + m.half_square * second + 2048) >> 12);
+  seen.slope_u = blend(&Rise::slope);
+  seen.slope_v = change(above.slope, below.slope, &Rise::level);
+  seen.spread_u = blend(&Rise::spread);
+  seen.spread_v = change(above.spread, below.spread, &Rise::level);
+  seen.twist = first + ((m.correlation * second + 2048) >> 12);
+  return seen;
+}
+
+// The pattern about a pixel at (fu, fv) of its module, q18. Where edges are out of reach, they are left out.
+Seen look(const PatternCell& cell, const EdgeProfile& profile, const BlockModel& m, int fu, int fv) {
+  const bool far_u = Edges::far(fu, m.reach_u), far_v = Edges::far(fv, m.reach_v);
+  const int left = cell.left[1], here = left + cell.middle[1];
+  Seen seen{};
+  if (far_u && far_v) {
+    seen.level = here * 4096;
+  } else if (far_v) {
+    const Rise rise = Edges(profile, fu, m.reach_u, m.per_module_u).across(left, cell.middle[1], cell.right[1]);
+    seen.level = q12(rise.level);
+    seen.slope_u = q12(rise.slope);
+    seen.spread_u = q12(rise.spread);
+  } else if (far_u) {
+    const int above = cell.left[0] + cell.middle[0], below = cell.left[2] + cell.middle[2];
+    const Rise rise = Edges(profile, fv, m.reach_v, m.per_module_v).across(above, here - above, below - here);
+    seen.level = q12(rise.level);
+    seen.slope_v = q12(rise.slope);
+    seen.spread_v = q12(rise.spread);
+  } else {
+    return look_at_corner(cell, Edges(profile, fu, m.reach_u, m.per_module_u),
+                          Edges(profile, fv, m.reach_v, m.per_module_v), m);
+  }
   return seen;
 }
 
@@ -139,8 +181,15 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
 }
 
 void sum_products(const BlockChannels& channels, int first, int count, ChannelSums& sums) {
+  const auto is_seen = [&](std::size_t channel) {
+    return channels.on_edges > 0 || channel == kOne || channel == kLevel || channel == kResidual;
+  };
   for (std::size_t a = 0; a < kChannels; ++a) {
     for (std::size_t b = a; b < kChannels; ++b) {
+      if (!is_seen(a) || !is_seen(b)) {
+        sums[a][b] = 0;
+        continue;
+      }
       const std::int16_t* const p = channels.values[a].data() + first;
       const std::int16_t* const q = channels.values[b].data() + first;
       std::int32_t sum = 0;

@@ -12,11 +12,19 @@ namespace {
 constexpr int kMostPasses = 10;
 // Passes after which levels that are not smooth are taken for what keeps the steps from ending.
 constexpr int kPatience = 4;
-// A step below this, or below this share of what the noise leaves open, is the last.
-constexpr double kLeastStep_px = 0.01;
-constexpr double kLeastStepShare = 0.25;
+// While the blur changes by little, the next step is some twentieth of the one before, if that is a small part of the
+// blur. So a step below this many of the deviations that the noise leaves open, within these bounds, is the last if it
+// changes the blur's variance by a share below that.
+constexpr double kLastStepDeviations = 4;
+constexpr double kLastStepFrom_px = 0.01, kLastStepTo_px = 0.03;
+constexpr double kLeastBlurChange = 0.1;
+// Corners that are known no better than this are not worth having, px.
+constexpr double kMostDeviation_px = 1;
 // Smaller markers have no pixels to spare for the first passes, px.
 constexpr double kSmall_px = 48;
+// Rows that the passes take: of the levels alone, of the first step, which is long and need not be exact, of the
+// others.
+constexpr int kRowSteps[3] = {4, 4, 1};
 // Steps beyond are no refinement, px; nor are corners further from where they began than this, modules.
 constexpr double kMostStep_px = 3;
 constexpr double kMostChange_modules = 0.75;
@@ -137,7 +145,9 @@ class Step {
     FitVector step;
     FitMatrix inverse;
     if (!normal.solve(step, inverse) || !move_levels(step, state_)) return false;
+    const double trace = state_.blur[0] + state_.blur[2];
     move_blur(step, state_.blur);
+    blur_change_ = std::fabs(state_.blur[0] + state_.blur[2] - trace) / trace;
     const FieldToCorners corners = corners_of_field(pass_.map, border_);
     const Corners before = state_.corners;
     double variances = 0;
@@ -153,10 +163,13 @@ class Step {
     }
     moved_px_ = farthest(before, state_.corners);
     deviation_px_ = std::sqrt(variances / 4);
-    return moved_px_ < kMostStep_px;
+    return moved_px_ < kMostStep_px && deviation_px_ < kMostDeviation_px;
   }
 
-  bool is_last() const { return moved_px_ < std::max(kLeastStep_px, kLeastStepShare * deviation_px_); }
+  bool is_last() const {
+    const double most = std::min(kLastStepTo_px, std::max(kLastStepFrom_px, kLastStepDeviations * deviation_px_));
+    return moved_px_ < most && blur_change_ < kLeastBlurChange;
+  }
   /// Variance of a residual, grey levels².
   double noise() const { return noise_; }
   const std::array<std::array<double, 3>, 4>& covariance_px2() const { return covariance_px2_; }
@@ -165,7 +178,7 @@ class Step {
   const FitPass& pass_;
   double border_;
   FitState& state_;
-  double noise_ = 0, moved_px_ = 0, deviation_px_ = 0;
+  double noise_ = 0, moved_px_ = 0, deviation_px_ = 0, blur_change_ = 0;
   std::array<std::array<double, 3>, 4> covariance_px2_;
 };
 
@@ -183,18 +196,17 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
   const FitScene scene{image, lens_, profile_, cells_, static_cast<double>(family.border_width)};
 
   const bool small = state.side_px < kSmall_px;
-  // Levels alone, from every fourth row; from mid-grey, so that no residual is beyond 128.
+  // Levels alone, from mid-grey, so that no residual is beyond 128.
   state.dark[0] = 128;
   FitPass pass(Tones::smooth);
   FitVector step;
-  if (!pass.run(scene, state, small ? 1 : 4) || !pass.normal.solve_levels(step) || !move_levels(step, state))
+  if (!pass.run(scene, state, small ? 1 : kRowSteps[0]) || !pass.normal.solve_levels(step) || !move_levels(step, state))
     return false;
 
   Tones tones = Tones::smooth;
   state.most_residual = kMostLimit;
   for (int k = 0; k < kMostPasses; ++k) {
-    // The first steps are long and need not be exact.
-    const int row_step = k == 0 && !small ? 2 : 1;
+    const int row_step = k == 0 && !small ? kRowSteps[1] : kRowSteps[2];
     pass = FitPass(tones);
     if (!pass.run(scene, state, row_step)) return false;
     Step next(pass, scene.border, state);
