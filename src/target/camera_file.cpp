@@ -26,8 +26,9 @@ CameraModel read_kalibr(const CameraFields& file, const std::string& name) {
               "say which by adding # and its name, e.g. FILE#" + cameras[1]);
   }
   const std::string chosen = name.empty() ? cameras.at(0) : name;
-  const CameraFields one =
-      file.table(chosen, "the file has " + std::to_string(cameras.size()) + " cameras, named like " + cameras.at(0));
+  std::string known;
+  for (const std::string& camera_name : cameras) known += (known.empty() ? "" : ", ") + camera_name;
+  const CameraFields one = file.table(chosen, "the file has " + known);
   if (one.text("camera_model") != "pinhole") {
     one.fail("camera_model", "\"" + one.text("camera_model") + "\" is not supported", "calibrate with pinhole");
   }
