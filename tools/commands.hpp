@@ -11,6 +11,7 @@ void add_calibrate(CLI::App& app, Console& console, int& exit_code);
 void add_demo(CLI::App& app, Console& console, int& exit_code);
 void add_detect(CLI::App& app, Console& console, int& exit_code);
 void add_flight(CLI::App& app, Console& console, int& exit_code);
+void add_plan(CLI::App& app, Console& console, int& exit_code);
 void add_print_tag(CLI::App& app, Console& console, int& exit_code);
 void add_run(CLI::App& app, Console& console, int& exit_code);
 void add_table(CLI::App& app, Console& console, int& exit_code);

@@ -20,6 +20,7 @@ constexpr const char* kExamples = R"(Examples:
   berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
   berth model show lite.berthnet                 its layers, with their sizes and costs
   berth print-tag tag36h11 7 --size 0.08 --out tag.pdf   a marker on paper, at true size
+  berth plan --size 0.08                         predicted pose errors, decode range, frame rate
   berth table                                    the paper's six-axis table, simulated: errors of every axis
   berth calibrate --board aprilgrid --grid 5x7 --size 0.03 --out cam.yaml images/
   berth doctor                                   what this machine has, and what it lacks
@@ -57,6 +58,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_eval(app, console, exit_code);
   add_model(app, console, exit_code);
   add_print_tag(app, console, exit_code);
+  add_plan(app, console, exit_code);
   add_table(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.
