@@ -19,6 +19,7 @@ constexpr double kMostBlur = 0.6;
 // Marker coordinates are quadratic in a block up to here, modules a pixel².
 constexpr double kMostBend = 0.25;
 constexpr int kLeastPixels = 60;
+constexpr int kLeastPairs = 100;
 // Markers smaller than this have their blocks taken in quarters, in which the field's factors are taken as constant.
 constexpr double kQuarters_px = 48;
 
@@ -155,8 +156,10 @@ bool FitPass::run(const FitScene& scene, const FitState& state, int row_step) {
       fill_channels(scene.image, scene.cells, scene.profile, model, row_step, channels);
       saturated_ += channels.saturated;
       pixels += channels.pixels;
+      even_ += channels.even;
       pairs_ += channels.pairs;
-      pair_products_ += channels.pair_products / 1024.0;
+      even_squares_ += channels.even_squares;
+      pair_products_ += channels.pair_products;
       if (channels.pixels == 0) continue;
 
       FitPlace place;
@@ -179,7 +182,6 @@ bool FitPass::run(const FitScene& scene, const FitState& state, int row_step) {
         place.contrast = blocks.contrast(place.x, place.y);
         const int count = 64 / parts;
         sum_products(channels, part * count, count, sums);
-        squares_ += sums[kResidual][kResidual] / 1024.0;
         normal.add(place, sums, channels.on_edges > 0);
       }
     }
@@ -189,7 +191,8 @@ bool FitPass::run(const FitScene& scene, const FitState& state, int row_step) {
 }
 
 double FitPass::correlation() const {
-  return pairs_ > 0 && squares_ > 0 ? (pair_products_ / pairs_) / (squares_ / pixels) : 0;
+  if (pairs_ < kLeastPairs || !(even_squares_ > 0)) return 0;
+  return (pair_products_ / pairs_) / (even_squares_ / even_);
 }
 
 }  // namespace berth

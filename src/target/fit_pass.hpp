@@ -45,7 +45,8 @@ class FitPass {
   /// Takes every `row_step`-th row of each block. Returns false where too few pixels count, the map has no end or the
   /// blur is too wide for the modules.
   bool run(const FitScene& scene, const FitState& state, int row_step);
-  /// Of residuals that are neighbours in a row: 0 where they are noise, near 1 where the model is wrong.
+  /// Of residuals that are neighbours in a row and away from all edges: 0 where they are noise or too few, near 1 where
+  /// the levels are wrong.
   double correlation() const;
 
   FitNormal normal;
@@ -53,8 +54,8 @@ class FitPass {
   int pixels = 0;
 
  private:
-  int saturated_ = 0, pairs_ = 0;
-  double pair_products_ = 0, squares_ = 0;
+  int saturated_ = 0, even_ = 0, pairs_ = 0;
+  double even_squares_ = 0, pair_products_ = 0;
 };
 
 }  // namespace berth

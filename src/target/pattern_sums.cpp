@@ -118,7 +118,7 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
                    int row_step, BlockChannels& channels) {
   for (auto& channel : channels.values) channel.fill(0);
   channels.pixels = channels.on_edges = channels.saturated = channels.outliers = 0;
-  channels.pairs = channels.pair_products = 0;
+  channels.even = channels.pairs = channels.even_squares = channels.pair_products = 0;
   for (int dy = -4; dy < 4; dy += row_step) {
     if (m.y + dy >= image.height) break;
     const u8* const row = image.row(m.y + dy);
@@ -152,11 +152,6 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
         continue;
       }
       ++channels.pixels;
-      before = residual;
-      if (left_residual != kNone) {
-        ++channels.pairs;
-        channels.pair_products += left_residual * residual;
-      }
       const bool on_edge = (seen.slope_u | seen.slope_v) != 0;
       channels.on_edges += on_edge ? 1 : 0;
       const std::size_t i = static_cast<std::size_t>(slot(dx + 4, dy + 4));
@@ -166,7 +161,16 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
       put(kOne, 1);
       put(kLevel, shown);
       put(kResidual, residual);
-      if (!on_edge) continue;
+      if (!on_edge) {
+        before = residual;
+        ++channels.even;
+        channels.even_squares += residual * residual;
+        if (left_residual != kNone) {
+          ++channels.pairs;
+          channels.pair_products += left_residual * residual;
+        }
+        continue;
+      }
       put(kTone, tone);
       // The tone curve's own steepness here.
       const int steep = 4096 + ((m.tone * (4096 - 2 * seen.level) + 2048) >> 12);

@@ -53,9 +53,10 @@ struct BlockChannels {
   /// Pixels that count; those among them that see an edge; those left out for being 0 or 255, and for being too far
   /// off.
   int pixels = 0, on_edges = 0, saturated = 0, outliers = 0;
-  /// Pixels whose left neighbour in the block counts too, and the sum of the products of their residuals, q10.
-  int pairs = 0;
-  std::int32_t pair_products = 0;
+  /// Pixels that count and see no edge, and the sum of their residuals' squares, q10; those among them whose left
+  /// neighbour in the block is another, and the sum of the products of both residuals.
+  int even = 0, pairs = 0;
+  std::int32_t even_squares = 0, pair_products = 0;
 };
 
 /// Compares a block with the model. `row_step`: every row, or every second.
