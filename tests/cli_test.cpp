@@ -136,6 +136,18 @@ TEST(Detect, PoseNeedsCameraAndSize) {
   }
 }
 
+TEST(Detect, PhotometricCornersComeWithTheirCovariance) {
+  const CommandRun plain = run_berth({"detect", "--json", kImage});
+  EXPECT_FALSE(plain.lines().at(0)["detections"][0].contains("corner_fit"));
+  const CommandRun fitted = run_berth({"detect", "--json", "--corners", "photometric", kImage});
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  const json marker = fitted.lines().at(0)["detections"][0];
+  ASSERT_TRUE(marker.contains("corner_fit"));
+  EXPECT_EQ(marker["corner_fit"]["covariance_px2"].size(), 4u);
+  EXPECT_GT(marker["corner_fit"]["noise"].get<double>(), 0);
+  EXPECT_NE(run_berth({"detect", "--corners", "guessed", kImage}).exit_code, 0);
+}
+
 TEST(Detect, BackendsPrintTheSameNumbers) {
   const auto detections = [](const std::string& backend) {
     const CommandRun run = run_berth({"detect", "--json", "--backend", backend, kImage});
