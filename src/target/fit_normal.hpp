@@ -43,7 +43,7 @@ class FitNormal {
  public:
   explicit FitNormal(Tones tones) : tones_(tones) {}
 
-  void add(const FitPlace& place, const ChannelSums& sums, bool has_edges);
+  void add(const FitPlace& where, const ChannelSums& integers, bool has_edges);
   /// Pulls the sum of the unknowns times `factors`, now `value` away from where it is expected, with this weight.
   void add_prior(const FitVector& factors, double value, double weight);
 

@@ -90,7 +90,7 @@ Seen look_at_corner(const PatternCell& cell, const Edges& along_u, const Edges& 
 // The pattern about a pixel at (fu, fv) of its module, q18. Where edges are out of reach, they are left out.
 Seen look(const PatternCell& cell, const EdgeProfile& profile, const BlockModel& m, int fu, int fv) {
   const bool far_u = Edges::far(fu, m.reach_u), far_v = Edges::far(fv, m.reach_v);
-  const int left = cell.left[1], here = left + cell.middle[1];
+  const int left{cell.left[1]}, here = left + cell.middle[1];
   Seen seen{};
   if (far_u && far_v) {
     seen.level = here * 4096;
