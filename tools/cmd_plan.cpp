@@ -72,7 +72,7 @@ std::vector<double> ranges_of(const std::string& text) {
 
 /// From a file, from lens and pixel, or the paper's.
 CameraModel camera_of(const PlanCommand& command) {
-  if (!command.engine.camera_file.empty()) return read_camera_info(command.engine.camera_file);
+  if (!command.engine.camera_file.empty()) return read_camera(command.engine.camera_file);
   if (!(command.lens_mm > 0) && !(command.pixel_um > 0)) return paper_camera();
   if (!(command.lens_mm > 0) || !(command.pixel_um > 0)) {
     throw Error("command line: give --lens and --pixel together, or --camera, or none for the paper's camera");

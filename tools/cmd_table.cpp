@@ -80,12 +80,13 @@ std::vector<TableSweep> run_all(const TableCommand& command, const table::Stage&
 
 int run_table(const TableCommand& command, Console& console) {
   const CameraModel camera =
-      command.engine.camera_file.empty() ? paper_camera() : read_camera_info(command.engine.camera_file);
+      command.engine.camera_file.empty() ? paper_camera() : read_camera(command.engine.camera_file);
   const table::Stage stage(camera, command.sensor);
   TableReaders readers(command.engine, camera);
   // Before minutes of work, not after.
   make_folder(command.out, "choose another for --out");
-  console.out() << setup_text(stage, command.nominal, command.frames, command.seed, readers.engine());
+  console.out() << setup_text(stage, command.nominal, command.frames, command.seed,
+                              readers.engine() + ", corners by " + command.engine.corners);
   const std::vector<TableSweep> runs = run_all(command, stage, readers, console);
   const MethodNames& methods = readers.names();
 
@@ -152,9 +153,10 @@ void add_table(CLI::App& app, Console& console, int& exit_code) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "of the noise and the random views")->capture_default_str();
-  command->add_option("--camera", options->engine.camera_file, "camera_info YAML [the paper's, 640 × 480]")
+  command->add_option("--camera", options->engine.camera_file, "camera file [the paper's, 640 × 480]")
       ->type_name("FILE");
   command->add_option("--out", options->out, "folder for CSV and SVG")->type_name("DIR")->capture_default_str();
+  add_corner_option(*command, options->engine);
   add_backend_options(*command, options->engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] { exit_code = run_table(*options, console); });

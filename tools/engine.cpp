@@ -44,6 +44,15 @@ void add_backend_options(CLI::App& command, EngineOptions& options) {
       ->capture_default_str();
 }
 
+void add_corner_option(CLI::App& command, EngineOptions& options) {
+  command
+      .add_option("--corners", options.corners,
+                  "corners from the border's edges, or from a fit of the whole pattern: slower, as exact as the noise "
+                  "allows")
+      ->check(CLI::IsMember({"edges", "photometric"}))
+      ->capture_default_str();
+}
+
 void add_engine_options(CLI::App& command, EngineOptions& options) {
   // allow_extra_args(false): "--family tag36h11 a.png" must not take a.png for a family.
   command
@@ -66,12 +75,7 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
   command.add_option("--pose", options.pose, "how poses are had: least-squares, or the paper's closed form")
       ->check(CLI::IsMember({"least-squares", "paper"}))
       ->capture_default_str();
-  command
-      .add_option("--corners", options.corners,
-                  "corners from the border's edges, or from a fit of the whole pattern: slower, as exact as the noise "
-                  "allows")
-      ->check(CLI::IsMember({"edges", "photometric"}))
-      ->capture_default_str();
+  add_corner_option(command, options);
   command.add_option("--max-hamming", options.max_hamming, "most wrong bits a code may have")
       ->type_name("N")
       ->capture_default_str();
@@ -167,6 +171,10 @@ double parse_size(const std::string& text) {
   return size_m;
 }
 
+CornerMethod corner_method(const EngineOptions& options) {
+  return options.corners == "photometric" ? CornerMethod::photometric : CornerMethod::edges;
+}
+
 DetectorConfig make_config(const EngineOptions& options) {
   DetectorConfig config;
   if (!options.families.empty()) config.families = options.families;
@@ -184,7 +192,7 @@ DetectorConfig make_config(const EngineOptions& options) {
   config.max_hamming = options.max_hamming;
   if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
   if (options.pose == "paper") config.pose_method = PoseMethod::paper;
-  if (options.corners == "photometric") config.corner_method = CornerMethod::photometric;
+  config.corner_method = corner_method(options);
   if (!options.camera_file.empty()) config.camera = read_camera(options.camera_file);
   return config;
 }

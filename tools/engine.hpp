@@ -44,6 +44,10 @@ void add_backend_options(CLI::App& command, EngineOptions& options);
 /// The above and --family, --camera, --size, --max-hamming
 void add_engine_options(CLI::App& command, EngineOptions& options);
 
+/// --corners
+void add_corner_option(CLI::App& command, EngineOptions& options);
+CornerMethod corner_method(const EngineOptions& options);
+
 /// --lockstep and --fallback, for streams
 void add_stream_backend_options(CLI::App& command, EngineOptions& options);
 

@@ -42,8 +42,9 @@ std::optional<Reading> by_paper(const CameraModel& camera, double size_m, const 
   return reading;
 }
 
-DetectorConfig config_for(const CameraModel& camera) {
+DetectorConfig config_for(const EngineOptions& options, const CameraModel& camera) {
   DetectorConfig config;
+  config.corner_method = corner_method(options);
   config.families = {table::kFamily};
   config.camera = camera;
   config.marker_size_m = 1;  // scaled to the marker of each frame
@@ -55,7 +56,7 @@ DetectorConfig config_for(const CameraModel& camera) {
 TableReaders::TableReaders(const EngineOptions& options, const CameraModel& camera)
     : camera_(camera),
       names_({"Berth", "Berth's corners, the paper's P4P", "Berth's corners, OpenCV IPPE"}),
-      engine_(open_chosen_backends(options), config_for(camera)) {
+      engine_(open_chosen_backends(options), config_for(options, camera)) {
   if (!AprilTagReader::built_in()) return;
   apriltag_ = std::make_unique<AprilTagReader>();
   names_.insert(names_.end(), {"AprilTag 3", "AprilTag's corners, OpenCV IPPE"});
