@@ -46,8 +46,10 @@ struct PlanCommand {
 
 /// "FROM:TO" in even ratios, or a list.
 std::vector<double> ranges_of(const std::string& text) {
-  const Error wrong = bad_field("command line", "--range", "'" + text + "'",
-                                "give FROM:TO or a list like 0.5,1,2, metres from 0.01 to 1000");
+  const auto wrong = [&text] {
+    return bad_field("command line", "--range", "'" + text + "'",
+                     "give FROM:TO or a list like 0.5,1,2, metres from 0.01 to 1000");
+  };
   std::vector<double> ranges;
   std::size_t at = 0;
   const bool span = text.find(':') != std::string::npos;
@@ -56,13 +58,13 @@ std::vector<double> ranges_of(const std::string& text) {
     try {
       ranges.push_back(parse_size(text.substr(at, end - at)));
     } catch (const Error&) {
-      throw wrong;
+      throw wrong();
     }
-    if (ranges.back() < 0.01) throw wrong;
+    if (ranges.back() < 0.01) throw wrong();
     at = end + 1;
   }
   if (!span) return ranges;
-  if (ranges.size() != 2) throw wrong;
+  if (ranges.size() != 2) throw wrong();
   const double from = ranges[0];
   const double ratio = std::pow(ranges[1] / from, 1.0 / (kRanges - 1));
   ranges.clear();
