@@ -28,7 +28,7 @@ struct NavigatorConfig {
   int search_threshold_q15 = 8192;
   /// One standard deviation of the range, as a share of it: 68 % of the errors of the network that comes with Berth lie
   /// within (models/README.md).
-  double range_deviation = 0.2;
+  double range_deviation = 0.12;
 };
 
 /// What the network says of a frame.
