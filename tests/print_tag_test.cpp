@@ -59,8 +59,9 @@ TEST(TagSheet, IsReadBackAtItsSize) {
       EXPECT_NEAR(c[3][0] - c[0][0], sheet.side_mm * kDots, 0.5);  // upright: upper left to upper right
       EXPECT_NEAR(c[1][1] - c[0][1], sheet.side_mm * kDots, 0.5);
       const auto& first = by_id[0]->corners[0];
-      EXPECT_NEAR(c[0][0] - first[0], static_cast<double>(i & 1) * sheet.pitch_mm() * kDots, 1);
-      EXPECT_NEAR(c[0][1] - first[1], static_cast<double>(i > 1) * sheet.pitch_mm() * kDots, 1);
+      const std::size_t column = i % 2, row = i / 2;
+      EXPECT_NEAR(c[0][0] - first[0], static_cast<double>(column) * sheet.pitch_mm() * kDots, 1);
+      EXPECT_NEAR(c[0][1] - first[1], static_cast<double>(row) * sheet.pitch_mm() * kDots, 1);
     }
   }
 }
