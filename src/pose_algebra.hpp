@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "berth/camera.hpp"
 #include "berth/marker.hpp"
 
 /// Vectors, rotations and poses in doubles, by + - x / and square roots in a fixed order: the same bits everywhere.
@@ -84,6 +85,19 @@ inline Pose moved(const Pose& pose, const std::array<double, 6>& step) {
   return {product(small_rotation({step[3], step[4], step[5]}), pose.R),
           {pose.t[0] + step[0], pose.t[1] + step[1], pose.t[2] + step[2]}};
 }
+
+/// A marker's corners in its own frame, m, in the paper's order: upper left, lower left, lower right, upper right.
+inline std::array<Vec3, 4> corner_places(double size_m) {
+  const double h = size_m / 2;
+  return {Vec3{-h, -h, 0}, Vec3{-h, h, 0}, Vec3{h, h, 0}, Vec3{h, -h, 0}};
+}
+/// Image (px) of a point before the camera, in its frame.
+inline Vec2 image_of(const CameraModel& camera, const Vec3& point) {
+  return camera.project(point[0] / point[2], point[1] / point[2]);
+}
+
+/// No infinity and no NaN.
+inline bool finite(double v) { return v - v == 0; }
 
 /// Inverse; the determinant must not be zero.
 inline Mat3 inverse(const Mat3& m) {

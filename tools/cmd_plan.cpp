@@ -10,6 +10,7 @@
 #include "berth/error.hpp"
 #include "camera/bad_input.hpp"
 #include "commands.hpp"
+#include "degrees.hpp"
 #include "engine.hpp"
 #include "plan/predict.hpp"
 #include "quantile.hpp"
@@ -26,7 +27,6 @@ constexpr const char* kExamples = R"(Examples:
 
 One standard deviation of a frame's pose. The model, and how well it was checked: docs/plan.md.)";
 
-constexpr double kDegrees = 57.295779513082323;
 constexpr int kRanges = 8;
 constexpr int kTimedFrames = 21;
 

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "output_file.hpp"
+#include "pose_algebra.hpp"
 
 namespace berth::cli {
 namespace {
@@ -26,7 +27,7 @@ void FilmStrip::add(View2D<const u8> image, const PilotFrame& found, const std::
   cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
   if (found.has_position && !found.from_marker) {
     const auto& p = found.position_m;
-    const auto at = camera_.project(p[0] / p[2], p[1] / p[2]);
+    const auto at = image_of(camera_, p);
     const double radius = camera_.fx * diameter_m_ / p[2] / 2;
     cv::circle(picture, {cvRound(at[0]), cvRound(at[1])}, cvRound(std::min(radius, 4000.0)), kNetwork, 2, cv::LINE_AA);
   }

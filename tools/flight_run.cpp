@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pose_algebra.hpp"
 #include "quantile.hpp"
 
 namespace berth::cli {
@@ -20,9 +21,7 @@ FlightPoint point_of(int index, const navset::FlightFrame& truth, const PilotFra
   point.from_marker = found.from_marker;
   point.range_m = sim::length(found.position_m);
   if (!found.from_marker) point.range_deviation_m = found.sighting->range_deviation_m;
-  const CameraModel camera = navset::Flight::camera();
-  const auto& p = found.position_m;
-  const auto at = camera.project(p[0] / p[2], p[1] / p[2]);
+  const auto at = image_of(navset::Flight::camera(), found.position_m);
   const double dx = at[0] - truth.x;
   const double dy = at[1] - truth.y;
   point.off = std::sqrt(dx * dx + dy * dy) / truth.d_px;

@@ -4,12 +4,11 @@
 
 #include <cmath>
 
+#include "degrees.hpp"
 #include "pose_algebra.hpp"
 
 namespace berth::cli {
 namespace {
-
-constexpr double kDegrees = 57.295779513082323;
 
 /// From m and rad to mm and degrees.
 double scale_of(std::size_t axis) { return axis < 3 ? 1000 : kDegrees; }

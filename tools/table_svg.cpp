@@ -6,13 +6,13 @@
 #include <cmath>
 #include <iterator>
 
+#include "degrees.hpp"
 #include "svg_panel.hpp"
 #include "trajectory_svg.hpp"
 
 namespace berth::cli {
 namespace {
 
-constexpr double kDegrees = 57.295779513082323;
 constexpr double kLeft = 76, kTop = 96, kSide = 300, kAcross = kSide + 96, kDown = kSide + 84;
 constexpr const char* kColours[] = {"#c8102e", "#e09f3e", "#7a5c00", "#1f4e8c", "#5fa8d3"};
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "degrees.hpp"
+
 namespace berth::cli {
 namespace {
-
-constexpr double kDegrees = 57.295779513082323;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;

@@ -53,27 +53,23 @@ Vec2 meeting(const Line& a, const Line& b) {
 }  // namespace
 
 std::array<std::array<double, 2>, 4> bent_side_shift(const CameraModel& camera, const Pose& marker, double size_m) {
-  const double h = size_m / 2;
-  const std::array<Vec2, 4> place = {Vec2{-h, -h}, Vec2{-h, h}, Vec2{h, h}, Vec2{h, -h}};
-  const auto image_of = [&](double x, double y) {
-    const Vec3 at = transform(marker, {x, y, 0});
-    return camera.project(at[0] / at[2], at[1] / at[2]);
-  };
+  const std::array<Vec3, 4> place = corner_places(size_m);
+  const auto seen = [&](double x, double y) { return image_of(camera, transform(marker, {x, y, 0})); };
   std::array<Line, 4> sides;
   for (std::size_t k = 0; k < 4; ++k) {
-    const Vec2 &a = place[k], &b = place[(k + 1) % 4];
-    const Vec2 from = image_of(a[0], a[1]), to = image_of(b[0], b[1]);
+    const Vec3 &a = place[k], &b = place[(k + 1) % 4];
+    const Vec2 from = seen(a[0], a[1]), to = seen(b[0], b[1]);
     const double trim = kTrimmed + kTrimmed_px / std::hypot(to[0] - from[0], to[1] - from[1]);
     std::vector<Vec2> points;
     for (int i = 0; i < kStations; ++i) {
       const double t = trim + (1 - 2 * trim) * i / (kStations - 1);
-      points.push_back(image_of(a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])));
+      points.push_back(seen(a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])));
     }
     sides[k] = fitted(points, from, to);
   }
   std::array<std::array<double, 2>, 4> shift{};
   for (std::size_t k = 0; k < 4; ++k) {
-    const Vec2 found = meeting(sides[(k + 3) % 4], sides[k]), corner = image_of(place[k][0], place[k][1]);
+    const Vec2 found = meeting(sides[(k + 3) % 4], sides[k]), corner = seen(place[k][0], place[k][1]);
     shift[k] = {found[0] - corner[0], found[1] - corner[1]};
   }
   return shift;

@@ -6,6 +6,7 @@
 
 #include "berth/error.hpp"
 #include "pilot/mode_switch.hpp"
+#include "pose_algebra.hpp"
 
 namespace berth {
 namespace {
@@ -93,7 +94,7 @@ struct Pilot::Impl {
       frame.has_position = frame.from_marker = true;
       // Should the marker be lost, the network knows where to look.
       const auto& p = frame.position_m;
-      const auto image_point = camera.project(p[0] / p[2], p[1] / p[2]);
+      const auto image_point = image_of(camera, p);
       navigator.expect(image_point[0], image_point[1],
                        (camera.fx + camera.fy) / 2 * config.navigator.target_diameter_m / p[2]);
       return;

@@ -27,13 +27,9 @@ constexpr double kRootPi = 1.7724538509055160;
 }  // namespace
 
 std::array<std::array<double, 2>, 4> true_corners(const View& view) {
-  const double h = view.size_m / 2;
-  const std::array<Vec3, 4> places = {{{-h, -h, 0}, {-h, h, 0}, {h, h, 0}, {h, -h, 0}}};
+  const std::array<Vec3, 4> places = corner_places(view.size_m);
   std::array<std::array<double, 2>, 4> corners{};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Vec3 at = transform(view.pose, places[i]);
-    corners[i] = view.camera.project(at[0] / at[2], at[1] / at[2]);
-  }
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = image_of(view.camera, transform(view.pose, places[i]));
   return corners;
 }
 

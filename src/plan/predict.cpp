@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pose_algebra.hpp"
+#include "target/marker_pose.hpp"
 #include "target/refine_pose.hpp"
 
 namespace berth::plan {
@@ -60,11 +61,9 @@ bool predict(const View& view, Prediction& prediction) {
   Prediction result;
   result.corners = corner_noise(view);
   const Corners corners = true_corners(view);
-  const double h = view.size_m / 2;
-  const std::array<Vec3, 4> places = {{{-h, -h, 0}, {-h, h, 0}, {h, h, 0}, {h, -h, 0}}};
+  constexpr CornerCovariances kEqual = {{{1, 0, 1}, {1, 0, 1}, {1, 0, 1}, {1, 0, 1}}};
   for (const Corners& seen : errors_of(corners, result.corners)) {
-    std::array<PoseCorner, 4> points;
-    for (std::size_t i = 0; i < 4; ++i) points[i] = {places[i], seen[i], {1, 0, 1}};
+    const std::array<PoseCorner, 4> points = pose_corners(view.size_m, seen, kEqual);
     RefinedPose refined;
     if (!refine_pose(view.camera, points.data(), points.size(), view.pose, refined)) return false;
     const table::SixAxes error = table::pose_error(refined.pose, view.pose);

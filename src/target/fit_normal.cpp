@@ -1,7 +1,8 @@
 #include "target/fit_normal.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "target/symmetric.hpp"
 
 namespace berth {
 namespace {
@@ -10,6 +11,9 @@ namespace {
 // taken as less than this, grey levels.
 constexpr double kLeastVariance = 0.02;
 constexpr double kLeastContrast = 2;
+
+// A pivot with less than this share of its diagonal element is not determined.
+constexpr double kLeastShare = 1e-10;
 
 constexpr double kQ12 = 1 / 4096.0, kQ5 = 1 / 32.0;
 constexpr std::array<double, kChannels> kUnit = {1, kQ12, kQ12, kQ12, kQ12, kQ12, kQ12, kQ12, kQ5};
@@ -61,35 +65,6 @@ void fill_factors(const FitPlace& p, Factors& f) {
   }
 }
 
-// Cholesky: lower triangle L of a = L Lᵀ, of the leading `count` unknowns.
-bool factorise(const FitMatrix& upper, std::size_t count, FitMatrix& lower) {
-  for (std::size_t j = 0; j < count; ++j) {
-    const double whole = upper[j * kUnknowns + j];
-    double d = whole;
-    for (std::size_t k = 0; k < j; ++k) d -= lower[j * kUnknowns + k] * lower[j * kUnknowns + k];
-    if (!(d > 1e-10 * whole)) return false;
-    const double root = std::sqrt(d);
-    lower[j * kUnknowns + j] = root;
-    for (std::size_t i = j + 1; i < count; ++i) {
-      double v = upper[j * kUnknowns + i];
-      for (std::size_t k = 0; k < j; ++k) v -= lower[i * kUnknowns + k] * lower[j * kUnknowns + k];
-      lower[i * kUnknowns + j] = v / root;
-    }
-  }
-  return true;
-}
-
-void back_substitute(const FitMatrix& lower, std::size_t count, FitVector& b) {
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t k = 0; k < i; ++k) b[i] -= lower[i * kUnknowns + k] * b[k];
-    b[i] /= lower[i * kUnknowns + i];
-  }
-  for (std::size_t i = count; i-- > 0;) {
-    for (std::size_t k = i + 1; k < count; ++k) b[i] -= lower[k * kUnknowns + i] * b[k];
-    b[i] /= lower[i * kUnknowns + i];
-  }
-}
-
 }  // namespace
 
 void FitNormal::add(const FitPlace& where, const ChannelSums& integers, bool has_edges) {
@@ -122,7 +97,7 @@ void FitNormal::add(const FitPlace& where, const ChannelSums& integers, bool has
     for (std::size_t i = kRuns[c].first; i < kRuns[c].end; ++i) {
       const double factor = factors[c][i];
       gradient_[i] += factor * sums[c][kResidual];
-      for (std::size_t j = i; j < kUnknowns; ++j) matrix_[i * kUnknowns + j] += factor * with[j];
+      for (std::size_t j = i; j < kUnknowns; ++j) matrix_[j * kUnknowns + i] += factor * with[j];
     }
   }
 }
@@ -130,33 +105,30 @@ void FitNormal::add(const FitPlace& where, const ChannelSums& integers, bool has
 void FitNormal::add_prior(const FitVector& factors, double value, double weight) {
   for (std::size_t i = 0; i < kUnknowns; ++i) {
     gradient_[i] -= weight * value * factors[i];
-    for (std::size_t j = i; j < kUnknowns; ++j) matrix_[i * kUnknowns + j] += weight * factors[i] * factors[j];
+    for (std::size_t j = i; j < kUnknowns; ++j) matrix_[j * kUnknowns + i] += weight * factors[i] * factors[j];
   }
 }
 
 bool FitNormal::solve_levels(FitVector& step) const {
-  FitMatrix lower;
-  if (!factorise(matrix_, kToneCurve, lower)) return false;
-  step = gradient_;
-  back_substitute(lower, kToneCurve, step);
+  FitMatrix factor = matrix_;
+  if (!factorise<kUnknowns>(factor, kLeastShare, kToneCurve)) return false;
+  step = berth::solve<kUnknowns>(factor, gradient_, kToneCurve);
   for (std::size_t i = kToneCurve; i < kUnknowns; ++i) step[i] = 0;
   return true;
 }
 
 bool FitNormal::solve(FitVector& step, FitMatrix& inverse) const {
-  FitMatrix whole = matrix_;
+  FitMatrix factor = matrix_;
   if (tones_ == Tones::local) {
-    for (std::size_t i = 0; i < kToneCurve; ++i) whole[i * kUnknowns + i] = 1;  // held
+    for (std::size_t i = 0; i < kToneCurve; ++i) factor[i * kUnknowns + i] = 1;  // held
   }
-  FitMatrix lower;
-  if (!factorise(whole, kUnknowns, lower)) return false;
-  step = gradient_;
-  back_substitute(lower, kUnknowns, step);
+  if (!factorise<kUnknowns>(factor, kLeastShare)) return false;
+  step = berth::solve<kUnknowns>(factor, gradient_);
   for (std::size_t j = 0; j < kUnknowns; ++j) {
     FitVector unit{};
     unit[j] = 1;
-    back_substitute(lower, kUnknowns, unit);
-    for (std::size_t i = 0; i < kUnknowns; ++i) inverse[i * kUnknowns + j] = unit[i];
+    const FitVector column = berth::solve<kUnknowns>(factor, unit);
+    for (std::size_t i = 0; i < kUnknowns; ++i) inverse[i * kUnknowns + j] = column[i];
   }
   return true;
 }

@@ -56,7 +56,7 @@ class FitNormal {
 
  private:
   Tones tones_;
-  FitMatrix matrix_ = {};  // upper triangle
+  FitMatrix matrix_ = {};  // lower triangle
   FitVector gradient_ = {};
   double squares_ = 0;
 };

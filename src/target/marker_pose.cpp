@@ -32,12 +32,9 @@ CornerCovariances corner_covariances(const Detection& marker, double deviation_p
 
 std::array<PoseCorner, 4> pose_corners(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
                                        const CornerCovariances& covariances_px2) {
-  const double h = size_m / 2;
-  const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
+  const std::array<Vec3, 4> places = corner_places(size_m);
   std::array<PoseCorner, 4> corners;
-  for (std::size_t i = 0; i < 4; ++i) {
-    corners[i] = {{place[i][0], place[i][1], 0}, corners_px[i], covariances_px2[i]};
-  }
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = {places[i], corners_px[i], covariances_px2[i]};
   return corners;
 }
 

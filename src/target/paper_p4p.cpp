@@ -47,8 +47,6 @@ bool solve_edge(const Vec3& q0, const Vec3& q1, const Vec3& across_a, const Vec3
   return true;
 }
 
-bool finite(double v) { return v - v == 0; }
-
 }  // namespace
 
 bool paper_p4p(const CameraModel& camera, double size_m, const std::array<std::array<double, 2>, 4>& corners_px,

@@ -46,11 +46,10 @@ Mat3 towards(double p, double q) {
 
 // The best translation for a rotation: linear least squares of u (z + t_z) = x + t_x and the same in v.
 bool translation_for(const Mat3& R, const Corners& seen, double size_m, Vec3& t) {
-  const double h = size_m / 2;
-  const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
+  const std::array<Vec3, 4> places = corner_places(size_m);
   double su = 0, sv = 0, square = 0, rx = 0, ry = 0, rz = 0;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Vec3 at = product(R, Vec3{place[i][0], place[i][1], 0});
+    const Vec3 at = product(R, places[i]);
     const double u = seen[i][0], v = seen[i][1];
     const double eu = u * at[2] - at[0], ev = v * at[2] - at[1];
     su += u;
@@ -68,8 +67,6 @@ bool translation_for(const Mat3& R, const Corners& seen, double size_m, Vec3& t)
   t[1] = (ry + sv * t[2]) / 4;
   return t[2] > 0;
 }
-
-bool finite(double v) { return v - v == 0; }
 
 }  // namespace
 

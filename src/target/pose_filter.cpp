@@ -174,8 +174,12 @@ struct PoseFilter::Impl {
       way_count = 0;
       return;
     }
+    went_in(had_track);
+  }
+
+  void went_in(bool jumped) {
     result.measured = true;
-    result.jumped = had_track;
+    result.jumped = jumped;
     result.age_s = 0;
     outliers = 0;
   }
@@ -189,10 +193,7 @@ struct PoseFilter::Impl {
     go_on(marker);
     if (found_count > 0) start(marker, kAnew);
     if (take_found()) {
-      result.measured = true;
-      result.jumped = ways[0].from != 0;
-      result.age_s = 0;
-      outliers = 0;
+      went_in(ways[0].from != 0);
       return;
     }
     result.outlier = true;
@@ -253,9 +254,7 @@ const FilteredPose& PoseFilter::update(std::int64_t mid_exposure_ns, const Detec
   if (it.had_track) {
     const double seconds = static_cast<double>(mid_exposure_ns - result.time_ns) * 1e-9;
     result.age_s += seconds;
-    if (result.age_s > it.config.lost_s) {
-      it.way_count = 0;
-    }
+    if (result.age_s > it.config.lost_s) it.way_count = 0;
     for (std::size_t k = 0; k < it.way_count; ++k) advance(seconds, it.variance, it.ways[k].motion);
   }
   result.time_ns = mid_exposure_ns;

@@ -11,17 +11,18 @@ namespace berth {
 template <std::size_t N>
 using SquareMatrix = std::array<double, N * N>;
 
-/// Lower triangle L of a = L Lᵀ in place of a's lower triangle (Cholesky). False where a is not positive definite.
+/// Lower triangle L of a = L Lᵀ in place of a's lower triangle (Cholesky), of the leading `count` unknowns. False where
+/// that is not positive definite: where a pivot is left with less than this share of its diagonal element.
 template <std::size_t N>
-bool factorise(SquareMatrix<N>& a) {
-  for (std::size_t j = 0; j < N; ++j) {
+bool factorise(SquareMatrix<N>& a, double least_share = 1e-14, std::size_t count = N) {
+  for (std::size_t j = 0; j < count; ++j) {
     double d = a[j * N + j];
     const double whole = d;
     for (std::size_t k = 0; k < j; ++k) d -= a[j * N + k] * a[j * N + k];
-    if (!(d > 1e-14 * whole)) return false;
+    if (!(d > least_share * whole)) return false;
     const double root = std::sqrt(d);
     a[j * N + j] = root;
-    for (std::size_t i = j + 1; i < N; ++i) {
+    for (std::size_t i = j + 1; i < count; ++i) {
       double v = a[i * N + j];
       for (std::size_t k = 0; k < j; ++k) v -= a[i * N + k] * a[j * N + k];
       a[i * N + j] = v / root;
@@ -30,15 +31,15 @@ bool factorise(SquareMatrix<N>& a) {
   return true;
 }
 
-/// x of L Lᵀ x = b.
+/// x of L Lᵀ x = b, of the leading `count` unknowns; the others stay b.
 template <std::size_t N>
-std::array<double, N> solve(const SquareMatrix<N>& factor, std::array<double, N> b) {
-  for (std::size_t i = 0; i < N; ++i) {
+std::array<double, N> solve(const SquareMatrix<N>& factor, std::array<double, N> b, std::size_t count = N) {
+  for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t k = 0; k < i; ++k) b[i] -= factor[i * N + k] * b[k];
     b[i] /= factor[i * N + i];
   }
-  for (std::size_t i = N; i-- > 0;) {
-    for (std::size_t k = i + 1; k < N; ++k) b[i] -= factor[k * N + i] * b[k];
+  for (std::size_t i = count; i-- > 0;) {
+    for (std::size_t k = i + 1; k < count; ++k) b[i] -= factor[k * N + i] * b[k];
     b[i] /= factor[i * N + i];
   }
   return b;
