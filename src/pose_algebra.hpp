@@ -86,6 +86,19 @@ inline Pose moved(const Pose& pose, const std::array<double, 6>& step) {
           {pose.t[0] + step[0], pose.t[1] + step[1], pose.t[2] + step[2]}};
 }
 
+/// Row-major 6 × 6: how step_between(from, moved(to, step)) changes with a small step, where `off` is
+/// step_between(from, to). Turns compose as Gibbs vectors, h' = (a + h + a × h) / (1 - a·h), a and h halves of the
+/// turns: from a = 0 the derivative is 1 - [h]x + h hᵀ.
+inline std::array<double, 36> by_small_step(const std::array<double, 6>& off) {
+  const double x = off[3] / 2, y = off[4] / 2, z = off[5] / 2;
+  return {1, 0, 0, 0,         0,         0,          //
+          0, 1, 0, 0,         0,         0,          //
+          0, 0, 1, 0,         0,         0,          //
+          0, 0, 0, 1 + x * x, x * y + z, x * z - y,  //
+          0, 0, 0, x * y - z, 1 + y * y, y * z + x,  //
+          0, 0, 0, x * z + y, y * z - x, 1 + z * z};
+}
+
 /// A marker's corners in its own frame, m, in the paper's order: upper left, lower left, lower right, upper right.
 inline std::array<Vec3, 4> corner_places(double size_m) {
   const double h = size_m / 2;

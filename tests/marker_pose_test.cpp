@@ -13,13 +13,13 @@
 #include "berth/camera.hpp"
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
+#include "support/noisy_corners.hpp"
 #include "target/planar_pose.hpp"
 #include "target/refine_pose.hpp"
 
 namespace berth {
 namespace {
 
-using Corners4 = std::array<std::array<double, 2>, 4>;
 constexpr double kSide_m = 0.08;
 
 Pose pose_of(double rx, double ry, double rz, const Vec3& t) { return {sim::rotation(rx, ry, rz), t}; }
@@ -34,32 +34,7 @@ Pose random_pose(sim::Random& random, double near_m, double far_m, double tilt) 
   return pose_of(rx, ry, rz, {x, y, z});
 }
 
-Corners4 seen_corners(const CameraModel& camera, const Pose& pose, double side_m = kSide_m) {
-  const double h = side_m / 2;
-  const double place[4][2] = {{-h, -h}, {-h, h}, {h, h}, {h, -h}};
-  Corners4 corners;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Vec3 at = transform(pose, {place[i][0], place[i][1], 0});
-    corners[i] = camera.project(at[0] / at[2], at[1] / at[2]);
-  }
-  return corners;
-}
-
 bool shows_front(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0.2 * length(pose.t); }
-
-/// Near enough normal: the sum of twelve uniform numbers.
-double normal(sim::Random& random) {
-  double sum = -6;
-  for (int k = 0; k < 12; ++k) sum += between(random, 0, 1);
-  return sum;
-}
-
-Corners4 with_noise(Corners4 corners, double deviation_px, sim::Random& random) {
-  for (auto& corner : corners) {
-    for (double& value : corner) value += deviation_px * normal(random);
-  }
-  return corners;
-}
 
 double difference(const Pose& a, const Pose& b) {
   double worst = 0;
@@ -75,25 +50,6 @@ std::array<double, 6> error_of(const Pose& found, const Pose& truth) {
           0.5 * (turn[7] - turn[5]), 0.5 * (turn[2] - turn[6]), 0.5 * (turn[3] - turn[1])};
 }
 
-/// e' C^-1 e by elimination.
-double mahalanobis(std::array<double, 36> c, std::array<double, 6> e) {
-  const std::array<double, 6> right = e;
-  for (std::size_t k = 0; k < 6; ++k) {
-    for (std::size_t i = k + 1; i < 6; ++i) {
-      const double factor = c[i * 6 + k] / c[k * 6 + k];
-      for (std::size_t j = k; j < 6; ++j) c[i * 6 + j] -= factor * c[k * 6 + j];
-      e[i] -= factor * e[k];
-    }
-  }
-  double sum = 0;
-  for (std::size_t i = 6; i-- > 0;) {
-    for (std::size_t j = i + 1; j < 6; ++j) e[i] -= c[i * 6 + j] * e[j];
-    e[i] /= c[i * 6 + i];
-    sum += e[i] * right[i];
-  }
-  return sum;
-}
-
 TEST(PlanarPoses, HaveTheTruthAmongThem) {
   sim::Random random(1);
   const CameraModel camera = paper_camera();
@@ -103,7 +59,7 @@ TEST(PlanarPoses, HaveTheTruthAmongThem) {
     if (!shows_front(truth)) continue;
     ++poses;
     std::array<Pose, 2> found;
-    const int count = planar_poses(camera, kSide_m, seen_corners(camera, truth), found);
+    const int count = planar_poses(camera, kSide_m, seen_corners(camera, truth, kSide_m), found);
     ASSERT_GE(count, 1) << poses;
     double nearest = difference(found[0], truth);
     if (count == 2) nearest = std::min(nearest, difference(found[1], truth));
@@ -119,8 +75,8 @@ TEST(MarkerPose, IsThereForSmallMarkersThatFaceTheCamera) {
     const Pose truth = random_pose(random, 0.5, 2, 0.1);
     Pose found;
     PoseUncertainty uncertainty;
-    ASSERT_TRUE(
-        marker_pose(camera, kSide_m, 0.15, with_noise(seen_corners(camera, truth), 0.15, random), found, uncertainty))
+    ASSERT_TRUE(marker_pose(camera, kSide_m, 0.15, with_noise(seen_corners(camera, truth, kSide_m), 0.15, random),
+                            found, uncertainty))
         << i;
   }
 }
@@ -135,7 +91,7 @@ TEST(MarkerPose, RecoversPosesOfAllKinds) {
     ++poses;
     Pose pose;
     PoseUncertainty uncertainty;
-    ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, seen_corners(camera, truth), pose, uncertainty)) << poses;
+    ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, seen_corners(camera, truth, kSide_m), pose, uncertainty)) << poses;
     ASSERT_LT(difference(pose, truth), 1e-7) << poses;
     ASSERT_LT(uncertainty.error_px, 1e-6) << poses;
   }
@@ -158,7 +114,7 @@ TEST(MarkerPose, ItsCovarianceIsThatOfItsErrors) {
     ++frames;
     Pose pose;
     PoseUncertainty uncertainty;
-    const Corners4 corners = with_noise(seen_corners(camera, truth), kDeviation_px, random);
+    const Corners4 corners = with_noise(seen_corners(camera, truth, kSide_m), kDeviation_px, random);
     ASSERT_TRUE(marker_pose(camera, kSide_m, kDeviation_px, corners, pose, uncertainty));
     const std::array<double, 6> error = error_of(pose, truth);
     const double nees = mahalanobis(uncertainty.covariance, error);
@@ -178,12 +134,13 @@ TEST(MarkerPose, SaysWhenTheCornersDoNotTellWhichPoseItIs) {
   Pose pose;
   PoseUncertainty uncertainty;
   const Pose far = pose_of(0.15, 0.1, 0.4, {0.1, 0, 2});
-  ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, with_noise(seen_corners(camera, far), 0.1, random), pose, uncertainty));
+  ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, with_noise(seen_corners(camera, far, kSide_m), 0.1, random), pose,
+                          uncertainty));
   EXPECT_TRUE(uncertainty.has_other);
   EXPECT_GT(uncertainty.ambiguity(), 0.5);
   const Pose near = pose_of(0.7, 0.1, 0.4, {0.02, 0, 0.25});
-  ASSERT_TRUE(
-      marker_pose(camera, kSide_m, 0.1, with_noise(seen_corners(camera, near), 0.1, random), pose, uncertainty));
+  ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, with_noise(seen_corners(camera, near, kSide_m), 0.1, random), pose,
+                          uncertainty));
   EXPECT_LT(uncertainty.ambiguity(), 0.1);
   EXPECT_LT(difference(pose, near), 0.01);
 }
@@ -191,7 +148,7 @@ TEST(MarkerPose, SaysWhenTheCornersDoNotTellWhichPoseItIs) {
 TEST(MarkerPose, ScalesWithTheMarker) {
   sim::Random random(6);
   const CameraModel camera = paper_camera();
-  const Corners4 corners = with_noise(seen_corners(camera, pose_of(0.5, 0.1, 0.4, {0.1, 0, 1})), 0.1, random);
+  const Corners4 corners = with_noise(seen_corners(camera, pose_of(0.5, 0.1, 0.4, {0.1, 0, 1}), kSide_m), 0.1, random);
   Detection small;
   Detection large;
   ASSERT_TRUE(marker_pose(camera, kSide_m, 0.1, corners, small.pose, small.pose_uncertainty.emplace()));

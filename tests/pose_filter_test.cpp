@@ -9,6 +9,7 @@
 #include "berth/error.hpp"
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
+#include "support/noisy_corners.hpp"
 #include "target/marker_pose.hpp"
 #include "target/symmetric.hpp"
 
@@ -29,23 +30,11 @@ PoseFilterConfig config() {
   return config;
 }
 
-/// Near enough normal: the sum of twelve uniform numbers.
-double normal(sim::Random& random) {
-  double sum = -6;
-  for (int k = 0; k < 12; ++k) sum += random.uniform(0, 1);
-  return sum;
-}
-
 /// What a detector with that noise says of a marker there.
 Detection seen(const Pose& truth, sim::Random& random, double noise_px = kNoise_px) {
   const CameraModel camera = paper_camera();
   Detection marker;
-  const auto corners = pose_corners(kSide_m, {}, {});
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Vec3 at = transform(truth, corners[i].point_m);
-    marker.corners[i] = camera.project(at[0] / at[2], at[1] / at[2]);
-    for (double& value : marker.corners[i]) value += noise_px * normal(random);
-  }
+  marker.corners = with_noise(seen_corners(camera, truth, kSide_m), noise_px, random);
   marker.has_pose =
       marker_pose(camera, kSide_m, kNoise_px, marker.corners, marker.pose, marker.pose_uncertainty.emplace());
   return marker;

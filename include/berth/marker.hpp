@@ -51,6 +51,10 @@ struct PoseUncertainty {
   bool has_other = false;
   Pose other;
   double other_error_px = 0;
+  /// As `covariance`, of `other`; and how much worse it fits, in squares of standard deviations of the corners: it is
+  /// e^(-excess/2) times as likely.
+  std::array<double, 36> other_covariance = {};
+  double other_excess = 0;
   /// 0: no doubt which of the two it is; 1: the corners do not tell.
   double ambiguity() const { return has_other && other_error_px > 0 ? error_px / other_error_px : has_other ? 1 : 0; }
 };

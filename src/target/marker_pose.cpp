@@ -60,11 +60,15 @@ bool marker_pose(const CameraModel& camera, double size_m, const std::array<std:
   if (found == 0) return false;
   if (found == 2 && refined[1].error_px < refined[0].error_px) std::swap(refined[0], refined[1]);
   pose = refined[0].pose;
-  uncertainty = {refined[0].covariance, refined[0].error_px, false, {}, 0};
+  uncertainty = {};
+  uncertainty.covariance = refined[0].covariance;
+  uncertainty.error_px = refined[0].error_px;
   if (found == 2 && !same(refined[0], refined[1])) {
     uncertainty.has_other = true;
     uncertainty.other = refined[1].pose;
     uncertainty.other_error_px = refined[1].error_px;
+    uncertainty.other_covariance = refined[1].covariance;
+    uncertainty.other_excess = refined[1].chi_square - refined[0].chi_square;
   }
   return true;
 }
@@ -76,7 +80,9 @@ void scale_pose(double factor, Detection& detection) {
   uncertainty.other.t = scaled(uncertainty.other.t, factor);
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = 0; j < 6; ++j) {
-      uncertainty.covariance[i * 6 + j] *= (i < 3 ? factor : 1) * (j < 3 ? factor : 1);
+      const double by = (i < 3 ? factor : 1) * (j < 3 ? factor : 1);
+      uncertainty.covariance[i * 6 + j] *= by;
+      uncertainty.other_covariance[i * 6 + j] *= by;
     }
   }
 }

@@ -1,0 +1,199 @@
+#include <cmath>
+
+#include "berth/stations.hpp"
+#include "target/marker_pose.hpp"
+#include "target/pose_steps.hpp"
+
+namespace berth {
+namespace {
+
+using Mat6 = SquareMatrix<6>;
+
+// Optima nearer to each other than this are one, m and rad: steps end far below it.
+constexpr double kSame = 1e-5;
+
+// One station's solutions for the robot's pose, the better first.
+struct Solutions {
+  std::array<RefinedPose, 2> of_robot;
+  std::size_t count = 0;
+};
+
+// (turn, -turn [arm]x; 0, turn), which takes a pose's error on to another's.
+Mat6 carrier(const Mat3& turn, const Vec3& arm) {
+  const Mat3 by_turn = product(turn, Mat3{0, arm[2], -arm[1], -arm[2], 0, arm[0], arm[1], -arm[0], 0});
+  Mat6 m{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      m[i * 6 + j] = m[(i + 3) * 6 + j + 3] = turn[3 * i + j];
+      m[i * 6 + j + 3] = by_turn[3 * i + j];
+    }
+  }
+  return m;
+}
+
+void carry(const Mat6& by, Mat6& covariance) {
+  covariance = multiply<6>(multiply<6>(by, covariance), transposed<6>(by));
+}
+
+// R(w) R t' + t + dt: turning moves what is away from the inner origin.
+RefinedPose compose(RefinedPose outer, const Pose& inner) {
+  carry(carrier({1, 0, 0, 0, 1, 0, 0, 0, 1}, product(outer.pose.R, inner.t)), outer.covariance);
+  outer.pose = berth::compose(outer.pose, inner);
+  return outer;
+}
+RefinedPose compose(const Pose& outer, RefinedPose inner) {
+  carry(carrier(outer.R, {0, 0, 0}), inner.covariance);
+  inner.pose = berth::compose(outer, inner.pose);
+  return inner;
+}
+// The error of the inverse is -Rᵀ (dt + [t]x w) and -Rᵀ w; the sign is nothing to a covariance.
+RefinedPose inverse(RefinedPose pose) {
+  carry(carrier(transposed(pose.pose.R), scaled(pose.pose.t, -1)), pose.covariance);
+  pose.pose = berth::inverse(pose.pose);
+  return pose;
+}
+
+// Robot frame to dock frame, from marker frame to camera frame.
+RefinedPose by_robot(const Station& station, const RefinedPose& view) {
+  return compose(station.marker, compose(inverse(view), berth::inverse(station.camera)));
+}
+RefinedPose by_dock(const Station& station, const RefinedPose& view) {
+  return compose(station.camera, compose(view, berth::inverse(station.marker)));
+}
+
+std::array<PoseCorner, 4> corners_of(const Station& station, const Detection& marker) {
+  return pose_corners(station.marker_size_m, marker.corners, corner_covariances(marker, station.corner_deviation_px));
+}
+
+template <class ToRobot>
+Solutions solutions(const Station& station, const Detection* marker, ToRobot to_robot) {
+  Solutions found;
+  if (marker == nullptr || !marker->has_pose || !marker->pose_uncertainty) return found;
+  const std::array<PoseCorner, 4> corners = corners_of(station, *marker);
+  const auto add = [&](const Pose& start) {
+    RefinedPose view;
+    if (!refine_pose(station.lens, corners.data(), corners.size(), start, view)) return;
+    found.of_robot[found.count++] = to_robot(station, view);
+  };
+  add(marker->pose);
+  if (marker->pose_uncertainty->has_other) add(marker->pose_uncertainty->other);
+  return found;
+}
+
+// All corners of both images, with the robot's pose unknown.
+class BothViews {
+ public:
+  BothViews(const StationPair& stations, const Detection& robot, const Detection& dock)
+      : robot_(stations.robot), dock_(stations.dock), to_robot_(berth::inverse(stations.robot.camera)),
+        to_dock_(berth::inverse(stations.dock.camera)), seen_by_robot_(corners_of(robot_, robot)),
+        seen_by_dock_(corners_of(dock_, dock)) {}
+
+  bool operator()(const Pose& pose, PoseNormal& normal) const {
+    // A point of the robot is at R b + t in the dock's frame.
+    for (const PoseCorner& corner : seen_by_dock_) {
+      const Vec3 arm = product(pose.R, transform(dock_.marker, corner.point_m));
+      const Vec3 at = transform(to_dock_, add(arm, pose.t));
+      if (!add_seen(dock_.lens, at, corner, normal, [&](const Vec3& by_point) {
+            return row(product(transposed(to_dock_.R), by_point), arm);
+          })) {
+        return false;
+      }
+    }
+    // A point c of the dock is at Rᵀ (c - t) in the robot's frame, which a step moves by -Rᵀ (dt + w x (c - t)).
+    for (const PoseCorner& corner : seen_by_robot_) {
+      const Vec3 arm = add(transform(robot_.marker, corner.point_m), scaled(pose.t, -1));
+      const Vec3 at = transform(to_robot_, product(transposed(pose.R), arm));
+      if (!add_seen(robot_.lens, at, corner, normal, [&](const Vec3& by_point) {
+            return row(scaled(product(pose.R, product(transposed(to_robot_.R), by_point)), -1), arm);
+          })) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+ private:
+  static std::array<double, 6> row(const Vec3& by_point, const Vec3& arm) {
+    const Vec3 by_turn = cross(arm, by_point);
+    return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
+  }
+
+  const Station &robot_, &dock_;
+  Pose to_robot_, to_dock_;  // vehicle to camera
+  std::array<PoseCorner, 4> seen_by_robot_, seen_by_dock_;
+};
+
+double apart(const Pose& a, const Pose& b) {
+  double most = 0;
+  for (const double value : step_between(a, b)) most = std::fmax(most, std::fabs(value));
+  return most;
+}
+
+// The first two different ones, by their sums of squares.
+void offer(const RefinedPose& pose, Solutions& best) {
+  for (std::size_t k = 0; k < best.count; ++k) {
+    if (apart(pose.pose, best.of_robot[k].pose) < kSame) return;
+  }
+  if (best.count < 2) {
+    best.of_robot[best.count++] = pose;
+  } else if (pose.chi_square < best.of_robot[1].chi_square) {
+    best.of_robot[1] = pose;
+  }
+  if (best.count == 2 && best.of_robot[1].chi_square < best.of_robot[0].chi_square) {
+    std::swap(best.of_robot[0], best.of_robot[1]);
+  }
+}
+
+RelativePose result_of(const Solutions& best, int views) {
+  RelativePose result;
+  result.views = views;
+  result.pose = best.of_robot[0].pose;
+  PoseUncertainty& known = result.uncertainty;
+  known.covariance = best.of_robot[0].covariance;
+  known.error_px = best.of_robot[0].error_px;
+  if (best.count > 1) {
+    known.has_other = true;
+    known.other = best.of_robot[1].pose;
+    known.other_error_px = best.of_robot[1].error_px;
+    known.other_covariance = best.of_robot[1].covariance;
+    known.other_excess = best.of_robot[1].chi_square - best.of_robot[0].chi_square;
+  }
+  return result;
+}
+
+const RefinedPose& nearest(const Solutions& solutions, const Pose& pose) {
+  const bool second = solutions.count > 1 &&
+                      apart(solutions.of_robot[1].pose, pose) < apart(solutions.of_robot[0].pose, pose);
+  return solutions.of_robot[second ? 1 : 0];
+}
+
+}  // namespace
+
+bool relative_pose(const StationPair& stations, const Detection* robot, const Detection* dock, RelativePose& result) {
+  const Solutions from_robot = solutions(stations.robot, robot, by_robot);
+  const Solutions from_dock = solutions(stations.dock, dock, by_dock);
+  if (from_robot.count == 0 && from_dock.count == 0) return false;
+  if (from_robot.count == 0 || from_dock.count == 0) {
+    result = result_of(from_dock.count == 0 ? from_robot : from_dock, 1);
+    return true;
+  }
+  const BothViews both(stations, *robot, *dock);
+  Solutions best;
+  for (const Solutions* starts : {&from_robot, &from_dock}) {
+    for (std::size_t k = 0; k < starts->count; ++k) {
+      RefinedPose pose;
+      double squares_px = 0;
+      if (!least_squares_pose(starts->of_robot[k].pose, both, pose, squares_px)) continue;
+      pose.error_px = std::sqrt(squares_px / 8);
+      offer(pose, best);
+    }
+  }
+  if (best.count == 0) return false;
+  result = result_of(best, 2);
+  const RefinedPose &robot_alone = nearest(from_robot, result.pose), &dock_alone = nearest(from_dock, result.pose);
+  result.disagreement = best.of_robot[0].chi_square - robot_alone.chi_square - dock_alone.chi_square;
+  result.difference = step_between(robot_alone.pose, dock_alone.pose);
+  return true;
+}
+
+}  // namespace berth
