@@ -50,17 +50,15 @@ Scene scene_at(const Pose& dock_marker_in_robot_camera) {
 
 Scene random_scene(sim::Random& random) {
   const double z = random.uniform(0.3, 1);
-  return scene_at(
-      {sim::rotation(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), random.uniform(-0.3, 0.3)),
-       {random.uniform(-0.1, 0.1) * z, random.uniform(-0.1, 0.1) * z, z}});
+  return scene_at({sim::rotation(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), random.uniform(-0.3, 0.3)),
+                   {random.uniform(-0.1, 0.1) * z, random.uniform(-0.1, 0.1) * z, z}});
 }
 
 Detection view_of(const Pose& truth, sim::Random& random, double noise_px = kNoise_px) {
   const CameraModel camera = paper_camera();
   Detection view;
   view.corners = with_noise(seen_corners(camera, truth, kSide_m), noise_px, random);
-  view.has_pose =
-      marker_pose(camera, kSide_m, kNoise_px, view.corners, view.pose, view.pose_uncertainty.emplace());
+  view.has_pose = marker_pose(camera, kSide_m, kNoise_px, view.corners, view.pose, view.pose_uncertainty.emplace());
   EXPECT_TRUE(view.has_pose);
   return view;
 }

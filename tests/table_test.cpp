@@ -173,6 +173,25 @@ TEST(TableRun, CountsOnlyWhatIsWhollyInView) {
   EXPECT_EQ(run.errors(0).shown, 1);
 }
 
+TEST(TableRun, HasASecondCameraOnThePlate) {
+  const CameraModel camera = paper_camera();
+  const table::Stage stage(camera, noiseless());
+  cli::TableReaders readers(simd(), camera, 2);
+  const std::size_t plate = readers.names().size() - 2, both = plate + 1;
+  const auto run = [&](std::size_t axis) {
+    return cli::run_sweep(table::axis_sweep(axis, {}, 5), stage, 1, readers, [] {});
+  };
+  const cli::TableSweep across = run(0);
+  EXPECT_EQ(across.errors(plate).found, 5);
+  EXPECT_EQ(across.errors(both).found, 5);
+  EXPECT_LT(across.errors(both).shares[0].rms(), 0.001);
+  // ±60° and ±30°: there the plate's camera looks elsewhere, and the first one's answer stands alone.
+  const cli::TableSweep turned = run(4);
+  EXPECT_EQ(turned.errors(plate).found, 1);
+  EXPECT_EQ(turned.errors(both).found, 5);
+  EXPECT_LE(turned.errors(both).axes[4].rms(), turned.errors(0).axes[4].rms());
+}
+
 TEST(CliTable, PrintsTablesAndWritesFiles) {
   const test::ScratchFolder folder;
   const auto run = test::run_berth({"table", "--only", "z,rectangle,still", "--frames", "4", "--backend", "simd",

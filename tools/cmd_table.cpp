@@ -20,6 +20,7 @@ constexpr const char* kExamples = R"(Examples:
   berth table                                    every experiment: tables here, CSV and SVG in ./berth-table
   berth table --only z,rectangle --backend vulkan
   berth table --noise 0 --full-well 0            what is left without noise
+  berth table --stations 2 --corners photometric the plate looks back: one camera, the other, both
   berth table --size 0.1 --blur 1.2 --frames 200 --out blurred
 
 Ranges, statistics and what was measured: docs/table.md.)";
@@ -37,6 +38,7 @@ struct TableCommand {
   std::string out = "berth-table";
   int frames = 101;
   int views = 20;
+  int stations = 1;
   u64 seed = 1;
 
   bool wants(const std::string& name) const {
@@ -82,7 +84,7 @@ int run_table(const TableCommand& command, Console& console) {
   const CameraModel camera =
       command.engine.camera_file.empty() ? paper_camera() : read_camera(command.engine.camera_file);
   const table::Stage stage(camera, command.sensor);
-  TableReaders readers(command.engine, camera);
+  TableReaders readers(command.engine, camera, command.stations);
   // Before minutes of work, not after.
   make_folder(command.out, "choose another for --out");
   console.out() << setup_text(stage, command.nominal, command.frames, command.seed,
@@ -151,6 +153,11 @@ void add_table(CLI::App& app, Console& console, int& exit_code) {
       ->capture_default_str();
   command->add_option("--views", options->views, "frames of each size and range")
       ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command
+      ->add_option("--stations", options->stations,
+                   "2: a camera on the plate looks back at a marker beside the first (docs/stations.md)")
+      ->check(CLI::Range(1, 2))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "of the noise and the random views")->capture_default_str();
   command->add_option("--camera", options->engine.camera_file, "camera file [the paper's, 640 × 480]")

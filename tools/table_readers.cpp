@@ -2,6 +2,8 @@
 
 #include <opencv2/calib3d.hpp>
 
+#include "pose_algebra.hpp"
+#include "table/second_station.hpp"
 #include "table/stage.hpp"
 #include "target/paper_p4p.hpp"
 #include "trajectory_svg.hpp"
@@ -51,32 +53,59 @@ DetectorConfig config_for(const EngineOptions& options, const CameraModel& camer
   return config;
 }
 
-}  // namespace
-
-TableReaders::TableReaders(const EngineOptions& options, const CameraModel& camera)
-    : camera_(camera),
-      names_({"Berth", "Berth's corners, the paper's P4P", "Berth's corners, OpenCV IPPE"}),
-      engine_(open_chosen_backends(options), config_for(options, camera)) {
-  if (!AprilTagReader::built_in()) return;
-  apriltag_ = std::make_unique<AprilTagReader>();
-  names_.insert(names_.end(), {"AprilTag 3", "AprilTag's corners, OpenCV IPPE"});
+// What the stations say, as the marker's pose in the robot's camera.
+std::optional<Reading> by_stations(const StationPair& stations, const Detection* robot, const Detection* dock) {
+  RelativePose relative;
+  if (!relative_pose(stations, robot, dock, relative)) return std::nullopt;
+  return Reading{inverse(relative.pose), std::nullopt};
 }
 
-std::vector<std::optional<Reading>> TableReaders::read(View2D<const u8> image, double size_m) {
-  std::vector<std::optional<Reading>> readings(names_.size());
+}  // namespace
+
+TableReaders::TableReaders(const EngineOptions& options, const CameraModel& camera, int stations)
+    : camera_(camera),
+      stations_(stations),
+      names_({"Berth", "Berth's corners, the paper's P4P", "Berth's corners, OpenCV IPPE"}),
+      engine_(open_chosen_backends(options), config_for(options, camera)) {
+  if (AprilTagReader::built_in()) {
+    apriltag_ = std::make_unique<AprilTagReader>();
+    names_.insert(names_.end(), {"AprilTag 3", "AprilTag's corners, OpenCV IPPE"});
+  }
+  if (stations_ > 1) names_.insert(names_.end(), {"Berth, the plate's camera", "Berth, both cameras"});
+}
+
+std::optional<Detection> TableReaders::find(View2D<const u8> image, double size_m) {
   for (Detection detection : engine_.detect(image, {}).frame.detections) {
     if (detection.id != table::kMarker) continue;
-    if (detection.has_pose) {
-      scale_pose(size_m, detection);
-      readings[0] = Reading{detection.pose, detection.corners};
-    }
-    readings[1] = by_paper(camera_, size_m, detection.corners);
-    readings[2] = by_ippe(camera_, size_m, detection.corners);
+    scale_pose(size_m, detection);
+    return detection;
   }
-  if (!apriltag_) return readings;
-  if (const auto found = apriltag_->read(image, table::kMarker, camera_, size_m)) {
-    readings[3] = Reading{found->pose, found->corners};
-    readings[4] = by_ippe(camera_, size_m, found->corners);
+  return std::nullopt;
+}
+
+std::vector<std::optional<Reading>> TableReaders::read(View2D<const u8> image, double size_m, View2D<const u8> back) {
+  std::vector<std::optional<Reading>> readings;
+  readings.reserve(names_.size());
+  const std::optional<Detection> seen = find(image, size_m);
+  if (seen) {
+    readings.push_back(seen->has_pose ? std::optional(Reading{seen->pose, seen->corners}) : std::nullopt);
+    readings.push_back(by_paper(camera_, size_m, seen->corners));
+    readings.push_back(by_ippe(camera_, size_m, seen->corners));
+  }
+  readings.resize(3);
+  if (apriltag_) {
+    if (const auto found = apriltag_->read(image, table::kMarker, camera_, size_m)) {
+      readings.push_back(Reading{found->pose, found->corners});
+      readings.push_back(by_ippe(camera_, size_m, found->corners));
+    }
+    readings.resize(5);
+  }
+  if (stations_ > 1) {
+    const std::optional<Detection> seen_back = find(back, size_m);
+    const StationPair stations = table::stations(camera_, size_m);
+    const Detection* dock = seen_back ? &*seen_back : nullptr;
+    readings.push_back(by_stations(stations, nullptr, dock));
+    readings.push_back(by_stations(stations, seen ? &*seen : nullptr, dock));
   }
   return readings;
 }

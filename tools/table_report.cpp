@@ -67,9 +67,10 @@ std::string axes_table(const std::vector<TableSweep>& sweeps, const MethodNames&
         const table::ErrorSum& share = errors.shares[axis];
         return fmt::format("{:.3f} | {:.3f}", 100 * share.largest(), 100 * share.rms());
       };
-      text += fmt::format("| {} | {} | {} | {:.3f} {} | {:.3f} {} | {} | {:.3f} |\n", extent(run), methods[m],
+      const std::string corners = errors.corners_px.count() > 0 ? fmt::format("{:.3f}", errors.corners_px.rms()) : "–";
+      text += fmt::format("| {} | {} | {} | {:.3f} {} | {:.3f} {} | {} | {} |\n", extent(run), methods[m],
                           found_text(errors), scale_of(axis) * own.largest(), unit_of(axis), scale_of(axis) * own.rms(),
-                          unit_of(axis), shares(), errors.corners_px.rms());
+                          unit_of(axis), shares(), corners);
     }
   }
   return text;
@@ -162,8 +163,8 @@ std::string table_csv(const std::vector<TableSweep>& sweeps, const MethodNames& 
           const table::SixAxes error = table::pose_error(reading->pose, frame.truth.pose);
           for (std::size_t k = 0; k < 6; ++k) csv += fmt::format(",{:.6f}", scale_of(k) * error[k]);
           table::SweepErrors corners;
-          corners.add_corners(reading->corners, frame.truth.corners);
-          csv += fmt::format(",{:.4f}\n", corners.corners_px.rms());
+          if (reading->corners) corners.add_corners(*reading->corners, frame.truth.corners);
+          csv += reading->corners ? fmt::format(",{:.4f}\n", corners.corners_px.rms()) : ",\n";
         } else {
           csv += ",,,,,,,\n";
         }

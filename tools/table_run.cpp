@@ -1,6 +1,7 @@
 #include "table_run.hpp"
 
 #include "sim/random.hpp"
+#include "table/second_station.hpp"
 
 namespace berth::cli {
 namespace {
@@ -18,7 +19,7 @@ table::SweepErrors TableSweep::errors(std::size_t method) const {
     if (!reading) continue;
     ++errors.found;
     errors.add(reading->pose, frame.truth.pose);
-    errors.add_corners(reading->corners, frame.truth.corners);
+    if (reading->corners) errors.add_corners(*reading->corners, frame.truth.corners);
   }
   return errors;
 }
@@ -30,7 +31,9 @@ TableSweep run_sweep(const table::Sweep& sweep, const table::Stage& stage, u64 s
     const table::Stop& stop = sweep.stops[i];
     const table::StageFrame seen = stage.look(stop, sim::scatter(seed ^ sim::scatter(i)));
     TableFrame frame{stop.travel, seen.truth, seen.truth.visible >= kWholly, {}};
-    frame.readings = readers.read(seen.image.view(), stop.size_m);
+    GrayImage back;
+    if (readers.stations() > 1) back = stage.look(table::seen_back(stop), sim::scatter(seed - sim::scatter(i))).image;
+    frame.readings = readers.read(seen.image.view(), stop.size_m, back.view());
     run.frames.push_back(std::move(frame));
     progress();
   }

@@ -84,8 +84,11 @@ Solutions solutions(const Station& station, const Detection* marker, ToRobot to_
 class BothViews {
  public:
   BothViews(const StationPair& stations, const Detection& robot, const Detection& dock)
-      : robot_(stations.robot), dock_(stations.dock), to_robot_(berth::inverse(stations.robot.camera)),
-        to_dock_(berth::inverse(stations.dock.camera)), seen_by_robot_(corners_of(robot_, robot)),
+      : robot_(stations.robot),
+        dock_(stations.dock),
+        to_robot_(berth::inverse(stations.robot.camera)),
+        to_dock_(berth::inverse(stations.dock.camera)),
+        seen_by_robot_(corners_of(robot_, robot)),
         seen_by_dock_(corners_of(dock_, dock)) {}
 
   bool operator()(const Pose& pose, PoseNormal& normal) const {
@@ -93,9 +96,8 @@ class BothViews {
     for (const PoseCorner& corner : seen_by_dock_) {
       const Vec3 arm = product(pose.R, transform(dock_.marker, corner.point_m));
       const Vec3 at = transform(to_dock_, add(arm, pose.t));
-      if (!add_seen(dock_.lens, at, corner, normal, [&](const Vec3& by_point) {
-            return row(product(transposed(to_dock_.R), by_point), arm);
-          })) {
+      if (!add_seen(dock_.lens, at, corner, normal,
+                    [&](const Vec3& by_point) { return row(product(transposed(to_dock_.R), by_point), arm); })) {
         return false;
       }
     }
@@ -162,8 +164,8 @@ RelativePose result_of(const Solutions& best, int views) {
 }
 
 const RefinedPose& nearest(const Solutions& solutions, const Pose& pose) {
-  const bool second = solutions.count > 1 &&
-                      apart(solutions.of_robot[1].pose, pose) < apart(solutions.of_robot[0].pose, pose);
+  const bool second =
+      solutions.count > 1 && apart(solutions.of_robot[1].pose, pose) < apart(solutions.of_robot[0].pose, pose);
   return solutions.of_robot[second ? 1 : 0];
 }
 
