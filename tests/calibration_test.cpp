@@ -9,7 +9,6 @@
 
 #include "berth/detector.hpp"
 #include "berth/error.hpp"
-#include "calibration/bent_sides.hpp"
 #include "calibration/board_finder.hpp"
 #include "calibration/calibrate.hpp"
 #include "sim/board.hpp"
@@ -281,36 +280,6 @@ TEST(ViewSet, RefusesWithTheReason) {
   EXPECT_THAT(corner.objections()[0], testing::Not(HasSubstr("upper left")));
 }
 
-TEST(BentSides, MoveTheDetectorsCornersAsTold) {
-  sim::Scene scene;
-  scene.camera = paper_camera();
-  scene.void_albedo = 0.88;
-  scene.sensor.read_noise = 0.5;
-  scene.markers.resize(1);
-  scene.markers[0].size_m = 0.03;
-  scene.markers[0].pose = translation(0.06, -0.04, 0.2);
-  for (const double k1 : {0.0, -0.35}) {
-    scene.camera.distortion = {k1};
-    const auto shifts = bent_side_shift(scene.camera, scene.markers[0].pose, scene.markers[0].size_m);
-    const auto truth = sim::truth(scene)[0].corners;
-    const GrayImage image = sim::render(scene);
-    const auto backend = open_backend("simd");
-    Detector detector(*backend, image.width(), image.height(), DetectorConfig{});
-    const FrameResult& result = detector.detect(image.view());
-    ASSERT_EQ(result.detections.size(), 1u);
-    double most = 0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        EXPECT_NEAR(result.detections[0].corners[k][axis] - truth[k][axis], shifts[k][axis], 0.06) << k1 << ' ' << k;
-        most = std::max(most, std::fabs(shifts[k][axis]));
-      }
-    }
-    EXPECT_EQ(most > 0.2, k1 != 0);
-    EXPECT_EQ(most < 1e-9, k1 == 0);
-  }
-}
-
-// The ChArUco board that OpenCV draws is the one that is looked for. Before 4.6 it drew even numbers of rows otherwise.
 TEST(BoardFinder, FindsOpenCvsCharuco) {
   Board board = small_board(BoardKind::charuco);
   board.columns = 6;

@@ -6,8 +6,9 @@
 #include <optional>
 
 #include "berth/error.hpp"
-#include "calibration/bent_sides.hpp"
 #include "pose_algebra.hpp"
+#include "target/bent_sides.hpp"
+#include "target/quad_map.hpp"
 
 namespace berth {
 namespace {
@@ -140,6 +141,15 @@ Pose pose_of(const cv::Mat& turn, const cv::Mat& shift) {
   return pose;
 }
 
+Corners shift_of(const CameraModel& camera, const Pose& marker, double size_m) {
+  Corners rays;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Vec3 at = transform(marker, corner_places(size_m)[k]);
+    rays[k] = {at[0] / at[2], at[1] / at[2]};
+  }
+  return bent_side_shift(camera, rays);
+}
+
 // What the views' points would be if the detector had found the markers' corners, and not where lines along their bent
 // sides meet: that depends on the lens, and is told from the solution so far.
 std::vector<std::vector<cv::Point2f>> straightened(const Board& board, const ViewSet& set, const CameraModel& camera,
@@ -152,7 +162,7 @@ std::vector<std::vector<cv::Point2f>> straightened(const Board& board, const Vie
     auto& own = points.emplace_back();
     for (std::size_t i = 0; i < view.points.size(); ++i) {
       const std::array<double, 2>& center = markers[view.points[i] / 4].center_m;
-      const auto shifts = bent_side_shift(camera, compose(pose, translation(center[0], center[1], 0)), board.marker_m);
+      const auto shifts = shift_of(camera, compose(pose, translation(center[0], center[1], 0)), board.marker_m);
       const std::array<double, 2>& shift = shifts[view.points[i] % 4];
       own.emplace_back(static_cast<float>(view.seen_px[i][0] - shift[0]),
                        static_cast<float>(view.seen_px[i][1] - shift[1]));

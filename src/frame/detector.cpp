@@ -11,6 +11,7 @@
 #include "frame/marker_plan.hpp"
 #include "frame/quads.hpp"
 #include "frame/stages.hpp"
+#include "target/bent_sides.hpp"
 #include "target/decode.hpp"
 #include "target/marker_pose.hpp"
 #include "target/paper_p4p.hpp"
@@ -127,6 +128,8 @@ struct Detector::Impl {
     if (!(config.corner_deviation_px > 0)) {
       throw Error("corner_deviation_px is " + std::to_string(config.corner_deviation_px) + "; give px above 0");
     }
+    is_bending = config.camera && (config.camera->lens != LensModel::radial_tangential ||
+                                   config.camera->distortion != std::array<double, 8>{});
     if (config.corner_method == CornerMethod::photometric) fit.emplace(config.camera, width, height);
     if (plan.frame().host() == nullptr) staging.resize(plan.geometry().frame_bytes());
     std::size_t slots = 0;
@@ -174,6 +177,7 @@ struct Detector::Impl {
     }
     for (const SearchResult& search : searches) decode(search);
     resolve_duplicates(result.detections);
+    if (is_bending) straighten();
     const Clock::time_point decoded = Clock::now();
     if (fit) refine_corners();
     const Clock::time_point refined = Clock::now();
@@ -219,10 +223,22 @@ struct Detector::Impl {
         d.corner_fit.reset();
         continue;
       }
-      QuadMap map;
-      if (map.set({d.corners[0], d.corners[3], d.corners[2], d.corners[1]}, 1, 0)) {
-        map.at(0.5, 0.5, d.center[0], d.center[1]);
-      }
+      find_center(d);
+    }
+  }
+
+  /// The edges' corners are where straight lines meet; the lens bends the marker's sides.
+  void straighten() {
+    for (Detection& d : result.detections) {
+      straighten_corners(*config.camera, d.corners);
+      find_center(d);
+    }
+  }
+
+  static void find_center(Detection& d) {
+    QuadMap map;
+    if (map.set({d.corners[0], d.corners[3], d.corners[2], d.corners[1]}, 1, 0)) {
+      map.at(0.5, 0.5, d.center[0], d.center[1]);
     }
   }
 
@@ -263,6 +279,7 @@ struct Detector::Impl {
   MarkerPlan plan;
   std::unique_ptr<Stream> stream;
   std::optional<PhotometricFit> fit;
+  bool is_bending = false;  // straight lines in the world are not straight in the image
   std::vector<u8> staging;  // empty where the host reaches the device's memory
   std::vector<SearchResult> searches;
   std::vector<Corners> refused;  // candidates of the frame that hold no marker

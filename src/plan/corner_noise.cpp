@@ -16,8 +16,6 @@ constexpr double kMostRows = 40, kTrim = 0.125, kTrim_px = 1, kFewestRows = 3;
 constexpr double kTimesBound = 0.66, kTimesBoundPerBlur = 1.35;
 // Without noise: of sharp edges more, of small blurred markers, whose modules run into each other, far more.
 constexpr double kFloor_px = 0.012, kSharp_px = 0.757, kSmall_px = 0.09, kSmallSide = 21;
-// How far the lens' bend of a side moves corners outwards, as a share of |k1| side^3 / f^2.
-constexpr double kBow = 0.13;
 
 double cube(double x) { return x * x * x; }
 
@@ -70,9 +68,7 @@ CornerNoise corner_noise(const View& view) {
     result.side_end_px[k] = std::sqrt(row_px * row_px * at_ends / std::min(length, kMostRows) + floor);
     squares += result.side_end_px[k] * result.side_end_px[k] / 4;
   }
-  result.bow_px =
-      kBow * std::fabs(view.camera.distortion[0]) * cube(result.side_px) / (view.camera.fx * view.camera.fy);
-  result.corner_px = std::sqrt(squares + result.bow_px * result.bow_px / 2);
+  result.corner_px = std::sqrt(squares);
   return result;
 }
 

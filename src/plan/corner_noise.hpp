@@ -36,8 +36,6 @@ struct CornerNoise {
   /// Of side k (from corner k to the next) at its ends, across it, px; and what share of that variance moves the whole
   /// side, while the rest turns it about its middle.
   std::array<double, 4> side_end_px = {}, shift_share = {};
-  /// How far every corner lies outside of its place because the lens bends the sides, px: a bias.
-  double bow_px = 0;
   /// All of it in a corner's coordinate, px: what to give to DetectorConfig::corner_deviation_px.
   double corner_px = 0;
 };

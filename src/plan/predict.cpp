@@ -44,12 +44,6 @@ std::vector<Corners> errors_of(const Corners& corners, const CornerNoise& noise)
       all.push_back(moved);
     }
   }
-  Corners outwards = corners;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Vec2 out = unit_between(corners[(i + 2) % 4], corners[i]);
-    for (std::size_t k = 0; k < 2; ++k) outwards[i][k] += noise.bow_px * out[k];
-  }
-  all.push_back(outwards);
   return all;
 }
 
