@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "berth/bundle.hpp"
+#include "berth/camera.hpp"
+#include "pose_algebra.hpp"
+#include "target/marker_pose.hpp"
+
+/// A surveyor's net: stations (frames) that sight points (markers). What start.cpp sets up and adjust.cpp adjusts.
+namespace berth {
+
+/// A marker as one frame shows it.
+struct Sight {
+  /// Which of SurveyNet::markers.
+  std::size_t marker = 0;
+  /// Where the corners were found, paper's order, px.
+  std::array<Vec2, 4> found_px = {};
+  /// What straight lines along sides that the lens bends make of them (calibration/bent_sides.hpp), px; taken off.
+  std::array<Vec2, 4> bend_px = {};
+  CornerCovariances covariances_px2 = {};
+  /// The corners are where such lines meet.
+  bool by_lines = false;
+  /// Corners that take part.
+  std::array<bool, 4> kept = {true, true, true, true};
+
+  Vec2 seen(std::size_t corner) const {
+    return {found_px[corner][0] - bend_px[corner][0], found_px[corner][1] - bend_px[corner][1]};
+  }
+  /// A sight that has lost two corners says too little to be trusted with the others.
+  bool is_kept() const { return kept[0] + kept[1] + kept[2] + kept[3] >= 3; }
+};
+
+/// A frame.
+struct Station {
+  /// The net's frame to camera frame.
+  Pose camera;
+  std::vector<Sight> sights;
+  /// It ties markers together only with two or more.
+  bool is_used() const;
+};
+
+/// Markers and frames, in the frame of the marker `origin`.
+struct SurveyNet {
+  CameraModel camera;
+  std::vector<BundleMarker> markers;
+  std::size_t origin = 0;
+  std::vector<Station> stations;
+};
+
+/// "tag36h11 5".
+std::string name_of(const BundleMarker& marker);
+/// Of those with `true`: "tag36h11 5, tag36h11 6".
+std::string names_of(const SurveyNet& net, const std::vector<bool>& chosen);
+
+/// Seen minus predicted of one corner, px. False where it is predicted behind the camera.
+bool residual(const SurveyNet& net, const Station& station, const Sight& sight, std::size_t corner, Vec2& off_px);
+/// Square of a residual in standard deviations of its covariance (px^2: of x, of x with y, of y).
+double whitened_square(const Vec2& off_px, const std::array<double, 3>& covariance_px2);
+
+/// Unknowns of the used stations' and of all markers' poses (and sizes) but the origin's.
+int unknowns_of(const SurveyNet& net, bool free_sizes);
+
+/// Calls visit(station, sight, corner, off_px, square) for every corner, kept or not: its residual and whitened_square,
+/// infinite where it is predicted behind the camera.
+template <class Net, class Visit>
+void each_corner(Net& net, const Visit& visit) {
+  for (auto& station : net.stations) {
+    for (auto& sight : station.sights) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        Vec2 off{};
+        const bool there = residual(net, station, sight, k, off);
+        visit(station, sight, k, off,
+              there ? whitened_square(off, sight.covariances_px2[k]) : std::numeric_limits<double>::infinity());
+      }
+    }
+  }
+}
+
+/// In how many used stations each pair of markers is sighted together, row-major [markers, markers].
+std::vector<int> sighted_together(const SurveyNet& net);
+/// Markers that no chain of pairs, each seen together in kLeastTogether frames or more, ties to the origin.
+std::vector<bool> unconnected(const SurveyNet& net);
+
+/// One frame might be a wrong reading.
+constexpr int kLeastTogether = 2;
+
+}  // namespace berth

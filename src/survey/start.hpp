@@ -1,0 +1,12 @@
+#pragma once
+
+#include "survey/net.hpp"
+
+namespace berth {
+
+/// Where the markers and cameras of a net are, roughly, from its sights alone: along a tree of pairs of markers that
+/// frames show together, each pair placed so that most frames agree. Either pose of a plane (docs/pose.md) is tried.
+/// All markers must be connected. Cameras whose frame gives none keep what they had, and their sights are dropped.
+void start_net(SurveyNet& net);
+
+}  // namespace berth
