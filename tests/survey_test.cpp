@@ -7,9 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 
+#include "berth/bundle.hpp"
 #include "berth/detector.hpp"
 #include "sim/geometry.hpp"
 #include "sim/scenario.hpp"
@@ -134,12 +134,11 @@ std::array<double, 6> errors_of(const std::vector<BundleMarker>& truth, const Su
   return errors;
 }
 
-/// Within 3 of the reported standard deviations, and so many metres and degrees, each axis.
+/// Each axis within so many of the reported standard deviations, and so many metres and degrees.
 void expect_recovered(const std::vector<BundleMarker>& truth, const Survey& survey, double within_m,
-                      double within_deg) {
+                      double within_deg, double deviations = 3) {
   EXPECT_THAT(survey.objections, IsEmpty());
   ASSERT_EQ(survey.bundle.markers.size(), truth.size());
-  double worst_m = 0, worst_deg = 0, worst = 0;
   for (std::size_t m = 0; m < truth.size(); ++m) {
     const std::array<double, 6> errors = errors_of(truth, survey, m);
     for (std::size_t i = 0; i < 6; ++i) {
@@ -150,18 +149,10 @@ void expect_recovered(const std::vector<BundleMarker>& truth, const Survey& surv
         continue;
       }
       EXPECT_GT(deviation, 0);
-      EXPECT_LT(std::fabs(errors[i]), 3 * deviation) << survey.bundle.markers[m].id << " axis " << i;
+      EXPECT_LT(std::fabs(errors[i]), deviations * deviation) << survey.bundle.markers[m].id << " axis " << i;
       EXPECT_LT(std::fabs(errors[i]), i < 3 ? within_m : within_deg) << survey.bundle.markers[m].id << " axis " << i;
-      (i < 3 ? worst_m : worst_deg) = std::max(i < 3 ? worst_m : worst_deg, std::fabs(errors[i]));
-      worst = std::max(worst, std::fabs(errors[i]) / deviation);
     }
   }
-  for (std::size_t m = 0; m < truth.size(); ++m)
-    std::printf("%d: %d frames %d corners %d rejected %.3f px\n", survey.bundle.markers[m].id, survey.markers[m].frames,
-                survey.markers[m].corners, survey.markers[m].rejected, survey.markers[m].rms_px);
-  std::printf("view range %.1f correlation %.2f\n", survey.view_range_deg, survey.correlation);
-  std::printf("worst %.3f mm, %.3f degrees, %.1f deviations; %.3f px RMS, %d frames, %d of %d corners rejected\n",
-              1000 * worst_m, worst_deg, worst, survey.rms_px, survey.frames, survey.rejected, survey.corners);
 }
 
 class EveryLens : public testing::TestWithParam<LensModel> {
@@ -187,7 +178,6 @@ TEST_P(EveryLens, KnowsHowWellItKnows) {
   for (int trial = 0; trial < 20; ++trial) {
     const Survey found = survey(gathered(noisy_frames(camera(), box(), 35, 0.1, random)), camera(), box_options());
     ASSERT_THAT(found.objections, IsEmpty());
-    std::printf("%.2f ", found.correlation);
     for (std::size_t m = 0; m < found.markers.size(); ++m) {
       if (m == found.origin) continue;
       const std::array<double, 6> errors = errors_of(box(), found, m);
@@ -351,20 +341,23 @@ INSTANTIATE_TEST_SUITE_P(Corners, EveryCorner, testing::Values(CornerMethod::edg
                            return method.param == CornerMethod::edges ? "edges" : "photometric";
                          });
 
+// Corners by lines lean to one side where a marker is seen askance, which no residual tells: there the errors go up to 3.1
+// deviations.
 TEST_P(EveryCorner, SurveysARenderedBox) {
   CameraModel camera;
   const SurveyFrames frames = sightings(BERTH_SOURCE_DIR "/scenarios/survey.toml", GetParam(), camera);
   const Survey found = survey(frames, camera, box_options());
-  expect_recovered(box(), found, 0.001, 1);
+  const bool by_lines = GetParam() == CornerMethod::edges;
+  expect_recovered(box(), found, by_lines ? 0.0001 : 0.00002, by_lines ? 0.15 : 0.015, by_lines ? 4 : 3);
 }
 
 TEST_P(EveryCorner, SurveysTheDockOfTheApproach) {
-  CameraModel camera;
   std::string approach = test::text_of(BERTH_SOURCE_DIR "/scenarios/approach.toml");
   const std::size_t count = approach.find("frames = 140");
   ASSERT_NE(count, std::string::npos);
   approach.replace(count, 12, "frames = 40");
   const test::ScratchFolder folder;
+  CameraModel camera;
   const SurveyFrames frames = sightings(folder.write("approach.toml", approach), GetParam(), camera);
   SurveyOptions options;
   options.size_m = 0.03;
@@ -373,7 +366,80 @@ TEST_P(EveryCorner, SurveysTheDockOfTheApproach) {
   const std::vector<BundleMarker> dock = {marker(0, 0.1, {0, 0, 0}, {}), marker(1, 0.03, {-0.09, -0.055, 0}, {}),
                                           marker(2, 0.03, {-0.09, 0.055, 0}, {}), marker(3, 0.03, {0.09, 0.055, 0}, {}),
                                           marker(4, 0.03, {0.09, -0.055, 0}, {})};
-  expect_recovered(dock, found, 0.001, 1);
+  const bool by_lines = GetParam() == CornerMethod::edges;
+  expect_recovered(dock, found, by_lines ? 0.0001 : 0.00003, by_lines ? 0.1 : 0.02);
+}
+
+// What lines along bent sides do to corners is taken off: without that, the fisheye's box would be off.
+TEST_P(EveryCorner, SurveysThroughAFisheye) {
+  const test::ScratchFolder folder;
+  write_camera_info(folder / "fisheye.yaml", fisheye_camera());
+  std::string scenario = test::text_of(BERTH_SOURCE_DIR "/scenarios/survey.toml");
+  scenario.replace(scenario.find("range_m = [0.4, 0.65]"), 21, "range_m = [0.25, 0.4]");
+  scenario.replace(scenario.find("[trajectory]"), 12, "[camera]\nfile = \"fisheye.yaml\"\n\n[trajectory]");
+  CameraModel camera;
+  const SurveyFrames frames = sightings(folder.write("fisheye.toml", scenario), GetParam(), camera);
+  ASSERT_EQ(camera.lens, LensModel::equidistant);
+  const Survey found = survey(frames, camera, box_options());
+  const bool by_lines = GetParam() == CornerMethod::edges;
+  expect_recovered(box(), found, by_lines ? 0.0001 : 0.00003, by_lines ? 0.15 : 0.02, by_lines ? 4 : 3);
+}
+
+TEST(CliSurvey, WritesTheBundle) {
+  const test::ScratchFolder folder;
+  const auto run = test::run_berth({"survey", BERTH_SOURCE_DIR "/scenarios/survey.toml", "--marker-size", "0.05",
+                                    "--size", "4=0.04", "--size", "5=0.04", "--origin", "1", "-o", folder / "box.yaml",
+                                    "--plot", folder / "box.svg", "--json", folder / "box.json", "--name", "box"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("frame   60 of 60 (100%)"));
+  EXPECT_THAT(run.out, HasSubstr("60 frames: 60 taken"));
+  EXPECT_THAT(run.out, HasSubstr("tag36h11 5"));
+  EXPECT_THAT(run.out, HasSubstr("box.yaml: 6 markers"));
+  const std::vector<Bundle> bundles = read_bundles(folder / "box.yaml");
+  ASSERT_EQ(bundles.size(), 1u);
+  EXPECT_EQ(bundles[0].name, "box");
+  EXPECT_GT(bundles[0].deviation_m, 0);
+  EXPECT_LT(bundles[0].deviation_m, 0.00005);
+  const auto json = nlohmann::json::parse(test::text_of(folder / "box.json"));
+  ASSERT_EQ(json["markers"].size(), 6u);
+  const std::vector<BundleMarker> truth = box();
+  for (std::size_t m = 0; m < truth.size(); ++m) {
+    const BundleMarker* found = bundles[0].find(*truth[m].family, truth[m].id);
+    ASSERT_NE(found, nullptr);
+    EXPECT_EQ(found->size_m, truth[m].size_m);
+    const Pose place = compose(inverse(truth[1].pose), truth[m].pose);
+    const std::array<double, 6> off = step_between(place, found->pose);
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_LT(std::fabs(off[i]), i < 3 ? 0.00003 : 0.0004) << m << " axis " << i;
+    EXPECT_EQ(json["markers"][m]["id"], truth[m].id);
+    EXPECT_EQ(json["markers"][m]["pose"]["t"][0], found->pose.t[0]);
+  }
+  EXPECT_THAT(test::text_of(folder / "box.svg"), HasSubstr("box: 6 markers, in the frame of tag36h11 1"));
+}
+
+TEST(CliSurvey, RefusesWithTheReasonAndWritesNothing) {
+  const test::ScratchFolder folder;
+  std::string scenario = test::text_of(BERTH_SOURCE_DIR "/scenarios/survey.toml");
+  scenario.replace(scenario.find("frames = 60"), 11, "frames = 3");
+  const std::string few = folder.write("few.toml", scenario);
+  const auto run = test::run_berth({"survey", few, "--marker-size", "0.05", "--out", folder / "box.yaml"});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.err, HasSubstr("refused: too few frames: 3 of the 5"));
+  EXPECT_EQ(test::text_of(folder / "box.yaml"), "");
+  const auto refused = [&](std::vector<std::string> arguments, const char* words) {
+    arguments.insert(arguments.begin(), "survey");
+    const auto bad = test::run_berth(arguments);
+    EXPECT_EQ(bad.exit_code, 2);
+    EXPECT_THAT(bad.err, HasSubstr(words));
+  };
+  const std::string image = BERTH_TEST_DATA "/tag36h11_7.png";
+  refused({few}, "--marker-size is required");
+  refused({few, "--marker-size", "50mm"}, "field '--marker-size' is '50mm'; give metres");
+  refused({few, "--marker-size", "0.05", "--size", "4:0.04"}, "give a marker's id and its side, e.g. 4=0.04");
+  refused({few, "--marker-size", "0.05", "--size", "4=four"}, "field '--size' is 'four'");
+  refused({image, "--marker-size", "0.05"}, "field '--camera' is missing");
+  write_camera_info(folder / "small.yaml", paper_camera(320, 240));
+  refused({image, "--marker-size", "0.05", "--camera", folder / "small.yaml"}, "but the camera's image is 320x240");
+  refused({"--marker-size", "0.05"}, "give images, or a --source");
 }
 
 }  // namespace

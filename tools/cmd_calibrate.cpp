@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <filesystem>
 #include <map>
 #include <memory>
 
@@ -11,13 +10,12 @@
 #include "calibration/board_finder.hpp"
 #include "calibration_show.hpp"
 #include "camera/bad_input.hpp"
-#include "camera/image_file.hpp"
-#include "camera/sources.hpp"
 #include "commands.hpp"
 #include "engine.hpp"
 #include "interrupt.hpp"
 #include "live_view.hpp"
 #include "output_file.hpp"
+#include "source_arguments.hpp"
 
 namespace berth::cli {
 namespace {
@@ -92,21 +90,6 @@ Board board_of(const CalibrateCommand& command) {
   }
   board.check();
   return board;
-}
-
-std::unique_ptr<Source> source_of(const CalibrateCommand& command) {
-  if (command.images.empty() == command.source.empty()) throw Error("command line: give images, or a --source");
-  if (!command.source.empty()) return open_source(command.source);
-  std::vector<std::string> paths;
-  for (const std::string& image : command.images) {
-    std::error_code ignored;
-    if (!std::filesystem::is_directory(image, ignored)) {
-      paths.push_back(image);
-      continue;
-    }
-    for (std::string& path : list_images(image, false)) paths.push_back(std::move(path));
-  }
-  return open_images(paths);
 }
 
 /// Looks for the board in every frame, with the coverage as it grows.
@@ -193,7 +176,7 @@ int refuse(const std::vector<std::string>& objections, Console& console) {
 
 int run_calibrate(const CalibrateCommand& command, Console& console) {
   const Board board = board_of(command);
-  const std::unique_ptr<Source> source = source_of(command);
+  const std::unique_ptr<Source> source = open_arguments(command.images, command.source);
   Gathering gathering(command, board, console);
   const ViewSet& set = gathering.run(*source);
   console.out() << "coverage " << coverage_bar(set) << '\n';

@@ -14,6 +14,7 @@ void add_flight(CLI::App& app, Console& console, int& exit_code);
 void add_plan(CLI::App& app, Console& console, int& exit_code);
 void add_print_tag(CLI::App& app, Console& console, int& exit_code);
 void add_run(CLI::App& app, Console& console, int& exit_code);
+void add_survey(CLI::App& app, Console& console, int& exit_code);
 void add_table(CLI::App& app, Console& console, int& exit_code);
 void add_verify(CLI::App& app, Console& console, int& exit_code);
 void add_bench(CLI::App& app, Console& console, int& exit_code);

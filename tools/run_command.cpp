@@ -23,6 +23,7 @@ constexpr const char* kExamples = R"(Examples:
   berth plan --size 0.08                         predicted pose errors, decode range, frame rate
   berth table                                    the paper's six-axis table, simulated: errors of every axis
   berth calibrate --board aprilgrid --grid 5x7 --size 0.03 --out cam.yaml images/
+  berth survey --camera cam.yaml --marker-size 0.05 --out bundle.yaml images/
   berth doctor                                   what this machine has, and what it lacks
 
 Exit codes: 0 all well; 1 verify or eval found a difference, or a flight did not dock; 2 bad input or usage.)";
@@ -59,6 +60,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_model(app, console, exit_code);
   add_print_tag(app, console, exit_code);
   add_plan(app, console, exit_code);
+  add_survey(app, console, exit_code);
   add_table(app, console, exit_code);
   add_doctor(app, console, exit_code);
   // What OpenCV has to say about a file, Berth says better.

@@ -172,6 +172,12 @@ double count(const SurveyNet& net, Survey& result) {
   return whitened;
 }
 
+// Of a coordinate of a corner, m: a turn by w moves corners, half a diagonal away, by w size / sqrt(3) on average.
+double corner_deviation_m(const BundleMarker& marker, const SurveyedMarker& known) {
+  const double turned = known.turn_deviation_deg() / kDegrees * marker.size_m / std::sqrt(3.0);
+  return std::sqrt((known.position_deviation_m() * known.position_deviation_m() + turned * turned) / 3);
+}
+
 // What is wrong with a result that there is.
 void judge(const SurveyNet& net, Survey& result) {
   std::vector<std::string>& all = result.objections;
@@ -243,6 +249,10 @@ Survey survey(const SurveyFrames& frames, const CameraModel& camera, const Surve
   if (!result.objections.empty() || !is_connected(net, result.objections)) return result;
   if (!set_deviations(net, options.free_sizes, squares, result)) {
     result.objections.push_back("the frames leave a marker's place open; take more, from other sides and nearer");
+  }
+  for (std::size_t m = 0; m < net.markers.size(); ++m) {
+    result.bundle.deviation_m =
+        std::max(result.bundle.deviation_m, corner_deviation_m(net.markers[m], result.markers[m]));
   }
   if (result.objections.empty()) judge(net, result);
   return result;

@@ -45,7 +45,8 @@ struct SurveyedMarker {
 
 /// Markers' places, from frames that show several.
 struct Survey {
-  /// Empty where the frames were refused before there were places; in order of family and id.
+  /// Empty where the frames were refused before there were places; in order of family and id. Without a name; its
+  /// deviation is that of the marker that is known worst.
   Bundle bundle;
   /// Of bundle.markers, in its order.
   std::vector<SurveyedMarker> markers;

@@ -192,8 +192,9 @@ Bundle read_ros_bundle(const Field& field, const MarkerFamily& usual, std::size_
 
 Bundle read_wpilib_layout(const Field& root, const std::string& path, double size_m, const MarkerFamily& usual) {
   if (!(size_m > 0)) {
-    throw Error(path + ": a WPILib field layout does not say how large its markers are; give their side in metres, "
-                       "0.1651 for those of FRC");
+    throw Error(path +
+                ": a WPILib field layout does not say how large its markers are; give their side in metres, "
+                "0.1651 for those of FRC");
   }
   Bundle bundle;
   bundle.name = "field";
