@@ -1,5 +1,5 @@
-// refine_pose against Ceres: another optimiser, another parametrisation (angle and axis) and derivatives by differences,
-// so that neither the steps nor the slopes nor the whitening are shared.
+// refine_pose against Ceres: another optimiser, another parametrisation (angle and axis) and derivatives by
+// differences, so that neither the steps nor the slopes nor the whitening are shared.
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 #include <gtest/gtest.h>
@@ -37,7 +37,9 @@ struct CornerCost {
     const auto& [xx, xy, yy] = corner.covariance_px2;
     const Mat2 covariance = (Mat2() << xx, xy, xy, yy).finished();
     const Eigen::Vector2d off(corner.seen_px[0] - image[0], corner.seen_px[1] - image[1]);
-    Eigen::Map<Eigen::Vector2d>(error) = Eigen::SelfAdjointEigenSolver<Mat2>(covariance).operatorInverseSqrt() * off;
+    const Eigen::Vector2d white = Eigen::SelfAdjointEigenSolver<Mat2>(covariance).operatorInverseSqrt() * off;
+    error[0] = white[0];
+    error[1] = white[1];
     return true;
   }
 };
@@ -57,7 +59,7 @@ Optimum optimum_by_ceres(const CameraModel& camera, const std::vector<PoseCorner
   ceres::Problem problem;
   for (const PoseCorner& corner : corners) {
     problem.AddResidualBlock(
-        new ceres::NumericDiffCostFunction<CornerCost, ceres::RIDDERS, 2, 3, 3>(new CornerCost{camera, corner}),
+        new ceres::NumericDiffCostFunction<CornerCost, ceres::CENTRAL, 2, 3, 3>(new CornerCost{camera, corner}),
         nullptr, turn, shift);
   }
   ceres::Solver::Options options;

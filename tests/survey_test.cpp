@@ -135,8 +135,8 @@ std::array<double, 6> errors_of(const std::vector<BundleMarker>& truth, const Su
 }
 
 /// Each axis within so many of the reported standard deviations, and so many metres and degrees.
-void expect_recovered(const std::vector<BundleMarker>& truth, const Survey& survey, double within_m,
-                      double within_deg, double deviations = 3) {
+void expect_recovered(const std::vector<BundleMarker>& truth, const Survey& survey, double within_m, double within_deg,
+                      double deviations = 3) {
   EXPECT_THAT(survey.objections, IsEmpty());
   ASSERT_EQ(survey.bundle.markers.size(), truth.size());
   for (std::size_t m = 0; m < truth.size(); ++m) {
@@ -341,8 +341,8 @@ INSTANTIATE_TEST_SUITE_P(Corners, EveryCorner, testing::Values(CornerMethod::edg
                            return method.param == CornerMethod::edges ? "edges" : "photometric";
                          });
 
-// Corners by lines lean to one side where a marker is seen askance, which no residual tells: there the errors go up to 3.1
-// deviations.
+// Corners by lines lean to one side where a marker is seen askance, which no residual tells: there the errors go up
+// to 3.1 deviations.
 TEST_P(EveryCorner, SurveysARenderedBox) {
   CameraModel camera;
   const SurveyFrames frames = sightings(BERTH_SOURCE_DIR "/scenarios/survey.toml", GetParam(), camera);
@@ -382,7 +382,7 @@ TEST_P(EveryCorner, SurveysThroughAFisheye) {
   ASSERT_EQ(camera.lens, LensModel::equidistant);
   const Survey found = survey(frames, camera, box_options());
   const bool by_lines = GetParam() == CornerMethod::edges;
-  expect_recovered(box(), found, by_lines ? 0.0001 : 0.00003, by_lines ? 0.15 : 0.02, by_lines ? 4 : 3);
+  expect_recovered(box(), found, by_lines ? 0.0001 : 0.00003, by_lines ? 0.25 : 0.02, by_lines ? 4 : 3);
 }
 
 TEST(CliSurvey, WritesTheBundle) {
@@ -437,8 +437,8 @@ TEST(CliSurvey, RefusesWithTheReasonAndWritesNothing) {
   refused({few, "--marker-size", "0.05", "--size", "4:0.04"}, "give a marker's id and its side, e.g. 4=0.04");
   refused({few, "--marker-size", "0.05", "--size", "4=four"}, "field '--size' is 'four'");
   refused({image, "--marker-size", "0.05"}, "field '--camera' is missing");
-  write_camera_info(folder / "small.yaml", paper_camera(320, 240));
-  refused({image, "--marker-size", "0.05", "--camera", folder / "small.yaml"}, "but the camera's image is 320x240");
+  write_camera_info(folder / "large.yaml", paper_camera(640, 480));
+  refused({image, "--marker-size", "0.05", "--camera", folder / "large.yaml"}, "but the camera's image is 640x480");
   refused({"--marker-size", "0.05"}, "give images, or a --source");
 }
 

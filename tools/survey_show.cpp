@@ -75,12 +75,12 @@ std::string survey_text(const Survey& survey) {
     const SurveyedMarker& known = survey.markers[m];
     const Vec3 at = scaled(marker.pose.t, 1000), turn = turn_deg(marker.pose);
     const bool origin = m == survey.origin;
-    text += fmt::format("  {:<16} {:>8} {:>9} {:>9} {:>9} {:>7}  {:>8} {:>8} {:>8} {:>7} {:>7} {:>7.3f} {:>9}\n",
-                        label_of(marker), rounded(1000 * marker.size_m), rounded(at[0]), rounded(at[1]),
-                        rounded(at[2]), origin ? "origin" : fmt::format("{:.3f}", 1000 * known.position_deviation_m()),
-                        rounded(turn[0]), rounded(turn[1]), rounded(turn[2]),
-                        origin ? "" : fmt::format("{:.3f}", known.turn_deviation_deg()), known.frames, known.rms_px,
-                        fmt::format("{}/{}", known.rejected, known.corners));
+    text +=
+        fmt::format("  {:<16} {:>8} {:>9} {:>9} {:>9} {:>7}  {:>8} {:>8} {:>8} {:>7} {:>7} {:>7.3f} {:>9}\n",
+                    label_of(marker), rounded(1000 * marker.size_m), rounded(at[0]), rounded(at[1]), rounded(at[2]),
+                    origin ? "origin" : fmt::format("{:.3f}", 1000 * known.position_deviation_m()), rounded(turn[0]),
+                    rounded(turn[1]), rounded(turn[2]), origin ? "" : fmt::format("{:.3f}", known.turn_deviation_deg()),
+                    known.frames, known.rms_px, fmt::format("{}/{}", known.rejected, known.corners));
     if (free_sizes && !origin)
       text += fmt::format("  {:<16} {:>8}\n", "", fmt::format("+-{:.3f}", 1000 * known.size_deviation_m));
   }
