@@ -212,7 +212,8 @@ TEST(Survey, FindsSizesThatAreFree) {
   Random random(6);
   const SurveyFrames frames = gathered(noisy_frames(paper_camera(), box(), 40, 0.05, random));
   SurveyOptions options;
-  options.size_m = 0.05;  // 4 and 5 have 0.04
+  options.size_m = 0.05;  // 4 and 5 have 0.04; of the others some are given wrong
+  options.sizes_m = {{1, 0.06}, {3, 0.04}};
   options.origin = 0;
   const Survey fixed = survey(frames, paper_camera(), options);
   EXPECT_FALSE(fixed.objections.empty());
@@ -387,7 +388,8 @@ TEST_P(EveryCorner, SurveysThroughAFisheye) {
 
 TEST(CliSurvey, WritesTheBundle) {
   const test::ScratchFolder folder;
-  const auto run = test::run_berth({"survey", BERTH_SOURCE_DIR "/scenarios/survey.toml", "--marker-size", "0.05",
+  const std::string scenario = BERTH_SOURCE_DIR "/scenarios/survey.toml";
+  const auto run = test::run_berth({"survey", scenario, "--marker-size", "0.05",
                                     "--size", "4=0.04", "--size", "5=0.04", "--origin", "1", "-o", folder / "box.yaml",
                                     "--plot", folder / "box.svg", "--json", folder / "box.json", "--name", "box"});
   EXPECT_EQ(run.exit_code, 0) << run.err;

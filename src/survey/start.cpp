@@ -14,6 +14,8 @@ namespace {
 constexpr double kWrong_px = 3;
 // A placement is compared in so many frames: as many as tell a plane's two poses apart, not all of a video.
 constexpr std::size_t kMostJudges = 16;
+// Sizes that are free are looked for in these steps, up to so many times as large and as small as said.
+constexpr double kFactorStep = 1.05, kMostFactor = 1.5;
 // Of a corner, px: here it only makes all corners equal.
 constexpr double kAnyDeviation_px = 0.3;
 
@@ -59,10 +61,11 @@ const Either* sight_of(const std::vector<Either>& view, std::size_t marker) {
   return nullptr;
 }
 
-// Corners of a marker that sits at `place` in the frame whose pose is sought.
-void add_corners(const SurveyNet& net, const Either& either, const Pose& place, std::vector<PoseCorner>& corners) {
+// Corners of a marker `factor` times as large as assumed that sits at `place` in the frame whose pose is sought.
+void add_corners(const SurveyNet& net, const Either& either, const Pose& place, double factor,
+                 std::vector<PoseCorner>& corners) {
   const double variance = kAnyDeviation_px * kAnyDeviation_px;
-  const std::array<Vec3, 4> places = corner_places(net.markers[either.sight->marker].size_m);
+  const std::array<Vec3, 4> places = corner_places(factor * net.markers[either.sight->marker].size_m);
   for (std::size_t k = 0; k < 4; ++k) {
     corners.push_back({transform(place, places[k]), either.sight->found_px[k], {variance, 0, variance}});
   }
@@ -75,11 +78,17 @@ struct Shared {
   double weight;
 };
 
-// How badly the frame fits with b placed at `place` in a's frame: at best 0, at worst kWrong_px squared.
-double misfit(const SurveyNet& net, const Shared& shared, const Pose& place) {
+// Where b is in a's frame, and how many times as large as assumed.
+struct Place {
+  Pose pose;
+  double factor = 1;
+};
+
+// How badly the frame fits with b there: at best 0, at worst kWrong_px squared.
+double misfit(const SurveyNet& net, const Shared& shared, const Place& place) {
   std::vector<PoseCorner> corners;
-  add_corners(net, *shared.a, Pose{}, corners);
-  add_corners(net, *shared.b, place, corners);
+  add_corners(net, *shared.a, Pose{}, 1, corners);
+  add_corners(net, *shared.b, place.pose, place.factor, corners);
   double least = kWrong_px * kWrong_px;
   for (const Pose& start : shared.a->poses) {
     RefinedPose refined;
@@ -89,28 +98,41 @@ double misfit(const SurveyNet& net, const Shared& shared, const Pose& place) {
   return least;
 }
 
+// Of a marker whose size is not known: near enough for the adjustment to find the rest of the way.
+std::vector<double> factors_tried(bool free_sizes) {
+  if (!free_sizes) return {1};
+  std::vector<double> factors = {1};
+  for (double factor = kFactorStep; factor < kMostFactor; factor *= kFactorStep) {
+    factors.push_back(factor);
+    factors.push_back(1 / factor);
+  }
+  return factors;
+}
+
 // b in a's frame as most of the frames have it.
-Pose agreed_place(const SurveyNet& net, std::vector<Shared> shared) {
+Place agreed_place(const SurveyNet& net, std::vector<Shared> shared, bool free_sizes) {
   if (shared.size() > kMostJudges) {  // evenly through time, as the camera moves
     std::vector<Shared> fewer;
     for (std::size_t k = 0; k < kMostJudges; ++k) fewer.push_back(shared[k * shared.size() / kMostJudges]);
     shared = std::move(fewer);
   }
-  Pose best;
+  Place best;
   double least = std::numeric_limits<double>::infinity();
-  for (const Shared& source : shared) {
-    for (const Pose& a : source.a->poses) {
-      for (const Pose& b : source.b->poses) {
-        const Pose place = compose(inverse(a), b);
-        double sum = 0;
-        for (const Shared& judge : shared) {
-          sum += misfit(net, judge, place);
-          if (!(sum < least)) break;
-        }
-        if (sum < least) {
-          least = sum;
-          best = place;
-        }
+  const auto judge = [&](const Pose& a, const Pose& b, double factor) {
+    Pose further = b;
+    further.t = scaled(b.t, factor);  // a larger marker further away gives the same image
+    const Place place = {compose(inverse(a), further), factor};
+    double sum = 0;
+    for (std::size_t k = 0; k < shared.size() && sum < least; ++k) sum += misfit(net, shared[k], place);
+    if (sum < least) {
+      least = sum;
+      best = place;
+    }
+  };
+  for (const double factor : factors_tried(free_sizes)) {
+    for (const Shared& source : shared) {
+      for (const Pose& a : source.a->poses) {
+        for (const Pose& b : source.b->poses) judge(a, b, factor);
       }
     }
   }
@@ -128,7 +150,7 @@ std::vector<Shared> shared_by(const Views& views, std::size_t a, std::size_t b) 
 }
 
 // Prim's: from the origin on, always along the pair that shows most, in squares of pixels, of both.
-void place_markers(SurveyNet& net, const Views& views) {
+void place_markers(SurveyNet& net, const Views& views, bool free_sizes) {
   const std::size_t count = net.markers.size();
   std::vector<double> weight(count * count);
   for (std::size_t a = 0; a < count; ++a) {
@@ -141,6 +163,7 @@ void place_markers(SurveyNet& net, const Views& views) {
     }
   }
   std::vector<bool> placed(count);
+  std::vector<double> factors(count, 1);
   placed[net.origin] = true;
   net.markers[net.origin].pose = {};
   for (std::size_t done = 1; done < count; ++done) {
@@ -154,10 +177,17 @@ void place_markers(SurveyNet& net, const Views& views) {
         to = b;
       }
     }
-    if (!(most > 0)) return;
-    net.markers[to].pose = compose(net.markers[from].pose, agreed_place(net, shared_by(views, from, to)));
+    if (!(most > 0)) break;
+    // The factor is between the two: what is known of the one's holds for the other's.
+    const Place place = agreed_place(net, shared_by(views, from, to), free_sizes);
+    const double outer = factors[from];
+    Pose inner = place.pose;
+    inner.t = scaled(inner.t, outer);
+    net.markers[to].pose = compose(net.markers[from].pose, inner);
+    factors[to] = outer * place.factor;
     placed[to] = true;
   }
+  for (std::size_t m = 0; m < count; ++m) net.markers[m].size_m *= factors[m];
 }
 
 // The sight's mean square residual, px^2, or what is wrong enough.
@@ -196,7 +226,7 @@ bool place_camera(const SurveyNet& net, const std::vector<Either>& view, Station
   std::vector<PoseCorner> corners;
   for (const Either& either : view) {
     if (misfit(net, station, *either.sight) < tolerance(either)) {
-      add_corners(net, either, net.markers[either.sight->marker].pose, corners);
+      add_corners(net, either, net.markers[either.sight->marker].pose, 1, corners);
     }
   }
   RefinedPose refined;
@@ -208,9 +238,10 @@ bool place_camera(const SurveyNet& net, const std::vector<Either>& view, Station
 
 }  // namespace
 
-void start_net(SurveyNet& net) {
-  const Views views = views_of(net);
-  place_markers(net, views);
+void start_net(SurveyNet& net, bool free_sizes) {
+  Views views = views_of(net);
+  place_markers(net, views, free_sizes);
+  if (free_sizes) views = views_of(net);
   for (std::size_t s = 0; s < net.stations.size(); ++s) {
     Station& station = net.stations[s];
     // The views point into the station's sights, so those are dropped by their flags alone.

@@ -227,7 +227,7 @@ Survey survey(const SurveyFrames& frames, const CameraModel& camera, const Surve
     return result;
   }
   if (!choose_origin(options, net, result.objections) || !is_connected(net, result.objections)) return result;
-  start_net(net);
+  start_net(net, options.free_sizes);
   if (!settle(net, options.free_sizes)) {
     result.objections.push_back("no solution: the frames do not agree about where the markers are; check the sizes");
     return result;
