@@ -389,9 +389,9 @@ TEST_P(EveryCorner, SurveysThroughAFisheye) {
 TEST(CliSurvey, WritesTheBundle) {
   const test::ScratchFolder folder;
   const std::string scenario = BERTH_SOURCE_DIR "/scenarios/survey.toml";
-  const auto run = test::run_berth({"survey", scenario, "--marker-size", "0.05",
-                                    "--size", "4=0.04", "--size", "5=0.04", "--origin", "1", "-o", folder / "box.yaml",
-                                    "--plot", folder / "box.svg", "--json", folder / "box.json", "--name", "box"});
+  const auto run = test::run_berth({"survey", scenario, "--marker-size", "0.05", "--size", "4=0.04", "--size", "5=0.04",
+                                    "--origin", "1", "-o", folder / "box.yaml", "--plot", folder / "box.svg", "--json",
+                                    folder / "box.json", "--name", "box"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("frame   60 of 60 (100%)"));
   EXPECT_THAT(run.out, HasSubstr("60 frames: 60 taken"));
