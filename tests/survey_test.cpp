@@ -371,7 +371,7 @@ TEST_P(EveryCorner, SurveysTheDockOfTheApproach) {
   expect_recovered(dock, found, by_lines ? 0.0001 : 0.00003, by_lines ? 0.1 : 0.02);
 }
 
-// What lines along bent sides do to corners is taken off: without that, the fisheye's box would be off.
+// Far from straight sides.
 TEST_P(EveryCorner, SurveysThroughAFisheye) {
   const test::ScratchFolder folder;
   write_camera_info(folder / "fisheye.yaml", fisheye_camera());

@@ -86,7 +86,7 @@ class Unknowns {
       : cameras_(net.stations.size()), markers_(net.markers.size()) {
     for (const BundleMarker& marker : net.markers) sizes_m_.push_back(marker.size_m);
     for (std::size_t s = 0; s < net.stations.size(); ++s) {
-      const Station& station = net.stations[s];
+      const SurveyStation& station = net.stations[s];
       if (!station.is_used()) continue;
       for (const Sight& sight : station.sights) {
         if (sight.is_kept()) add(net, station, sight, cameras_[s].data(), robust);
@@ -157,12 +157,12 @@ class Unknowns {
   }
 
  private:
-  void add(const SurveyNet& net, const Station& station, const Sight& sight, double* camera, double robust) {
+  void add(const SurveyNet& net, const SurveyStation& station, const Sight& sight, double* camera, double robust) {
     using Cost = ceres::AutoDiffCostFunction<CornerError, 2, 6, 6, 1>;
     const std::size_t m = sight.marker;
     for (std::size_t k = 0; k < 4; ++k) {
       if (!sight.kept[k]) continue;
-      auto error = std::make_unique<CornerError>(net.camera, station.camera, net.markers[m].pose, k, sight.seen(k),
+      auto error = std::make_unique<CornerError>(net.camera, station.camera, net.markers[m].pose, k, sight.seen_px[k],
                                                  sight.covariances_px2[k]);
       // The problem owns both.
       ceres::LossFunction* loss = robust > 0 ? new ceres::CauchyLoss(robust) : nullptr;

@@ -52,7 +52,7 @@ double correlation_factor(const SurveyNet& net, bool free_sizes, const Survey& r
 bool set_deviations(const SurveyNet& net, bool free_sizes, double squares, Survey& result) {
   NetCovariance covariance;
   int kept = 0;
-  for (const Station& station : net.stations) {
+  for (const SurveyStation& station : net.stations) {
     for (const Sight& sight : station.sights) {
       if (!station.is_used() || !sight.is_kept()) continue;
       kept += static_cast<int>(std::count(sight.kept.begin(), sight.kept.end(), true));

@@ -4,7 +4,7 @@
 
 namespace berth {
 
-bool Station::is_used() const {
+bool SurveyStation::is_used() const {
   return std::count_if(sights.begin(), sights.end(), [](const Sight& sight) { return sight.is_kept(); }) >= 2;
 }
 
@@ -18,11 +18,12 @@ std::string names_of(const SurveyNet& net, const std::vector<bool>& chosen) {
   return names;
 }
 
-bool residual(const SurveyNet& net, const Station& station, const Sight& sight, std::size_t corner, Vec2& off_px) {
+bool residual(const SurveyNet& net, const SurveyStation& station, const Sight& sight, std::size_t corner,
+              Vec2& off_px) {
   const BundleMarker& marker = net.markers[sight.marker];
   const Vec3 at = transform(station.camera, transform(marker.pose, corner_places(marker.size_m)[corner]));
   if (!(at[2] > 0)) return false;
-  const Vec2 image = image_of(net.camera, at), seen = sight.seen(corner);
+  const Vec2 image = image_of(net.camera, at), seen = sight.seen_px[corner];
   off_px = {seen[0] - image[0], seen[1] - image[1]};
   return finite(off_px[0]) && finite(off_px[1]);
 }
@@ -41,7 +42,7 @@ int unknowns_of(const SurveyNet& net, bool free_sizes) {
 std::vector<int> sighted_together(const SurveyNet& net) {
   const std::size_t count = net.markers.size();
   std::vector<int> together(count * count);
-  for (const Station& station : net.stations) {
+  for (const SurveyStation& station : net.stations) {
     for (const Sight& a : station.sights) {
       for (const Sight& b : station.sights) {
         if (a.marker != b.marker && a.is_kept() && b.is_kept()) ++together[a.marker * count + b.marker];

@@ -19,24 +19,19 @@ struct Sight {
   /// Which of SurveyNet::markers.
   std::size_t marker = 0;
   /// Where the corners were found, paper's order, px.
-  std::array<Vec2, 4> found_px = {};
-  /// What straight lines along sides that the lens bends make of them (calibration/bent_sides.hpp), px; taken off.
-  std::array<Vec2, 4> bend_px = {};
+  std::array<Vec2, 4> seen_px = {};
   CornerCovariances covariances_px2 = {};
-  /// The corners are where such lines meet.
+  /// The corners are where straight lines along the sides meet.
   bool by_lines = false;
   /// Corners that take part.
   std::array<bool, 4> kept = {true, true, true, true};
 
-  Vec2 seen(std::size_t corner) const {
-    return {found_px[corner][0] - bend_px[corner][0], found_px[corner][1] - bend_px[corner][1]};
-  }
   /// A sight that has lost two corners says too little to be trusted with the others.
   bool is_kept() const { return kept[0] + kept[1] + kept[2] + kept[3] >= 3; }
 };
 
 /// A frame.
-struct Station {
+struct SurveyStation {
   /// The net's frame to camera frame.
   Pose camera;
   std::vector<Sight> sights;
@@ -49,7 +44,7 @@ struct SurveyNet {
   CameraModel camera;
   std::vector<BundleMarker> markers;
   std::size_t origin = 0;
-  std::vector<Station> stations;
+  std::vector<SurveyStation> stations;
 };
 
 /// "tag36h11 5".
@@ -58,7 +53,7 @@ std::string name_of(const BundleMarker& marker);
 std::string names_of(const SurveyNet& net, const std::vector<bool>& chosen);
 
 /// Seen minus predicted of one corner, px. False where it is predicted behind the camera.
-bool residual(const SurveyNet& net, const Station& station, const Sight& sight, std::size_t corner, Vec2& off_px);
+bool residual(const SurveyNet& net, const SurveyStation& station, const Sight& sight, std::size_t corner, Vec2& off_px);
 /// Square of a residual in standard deviations of its covariance (px^2: of x, of x with y, of y).
 double whitened_square(const Vec2& off_px, const std::array<double, 3>& covariance_px2);
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "calibration/bent_sides.hpp"
 #include "survey/adjust.hpp"
 
 namespace berth {
@@ -27,7 +26,7 @@ constexpr std::array<double, 3> kRobustShares = {0.95, 0.8, 0.5};
 // has no part in it.
 double deviation_of(const SurveyNet& net, bool free_sizes, double share) {
   std::vector<double> squares;
-  each_corner(net, [&](const Station& station, const Sight&, std::size_t, const Vec2&, double square) {
+  each_corner(net, [&](const SurveyStation& station, const Sight&, std::size_t, const Vec2&, double square) {
     if (station.is_used()) squares.push_back(square);
   });
   if (squares.empty()) return 0;
@@ -45,23 +44,13 @@ double deviation_of(const SurveyNet& net, bool free_sizes, double share) {
 // that changes something.
 bool reject(SurveyNet& net, double most) {
   bool changed = false;
-  each_corner(net, [&](const Station&, Sight& sight, std::size_t k, const Vec2& off, double square) {
+  each_corner(net, [&](const SurveyStation&, Sight& sight, std::size_t k, const Vec2& off, double square) {
     const bool by_lines = sight.by_lines && off[0] * off[0] + off[1] * off[1] < kByLines_px * kByLines_px;
     const bool keep = square < most * most || (by_lines && finite(square));
     changed = changed || keep != sight.kept[k];
     sight.kept[k] = keep;
   });
   return changed;
-}
-
-void straighten(SurveyNet& net) {
-  for (Station& station : net.stations) {
-    for (Sight& sight : station.sights) {
-      if (!sight.by_lines || !sight.is_kept()) continue;
-      const BundleMarker& marker = net.markers[sight.marker];
-      sight.bend_px = bent_side_shift(net.camera, compose(station.camera, marker.pose), marker.size_m);
-    }
-  }
 }
 
 }  // namespace
@@ -74,7 +63,6 @@ bool settle(SurveyNet& net, bool free_sizes) {
     const bool changed = reject(net, robust ? std::numeric_limits<double>::infinity() : kWrong * deviation);
     if (round > static_cast<int>(kRobustShares.size()) + 1 && !changed) return true;
     if (!adjust(net, free_sizes, robust ? kRobust * deviation : 0)) return false;
-    straighten(net);
   }
   return true;
 }

@@ -37,13 +37,13 @@ double area_of(const std::array<Vec2, 4>& c) {
 
 Views views_of(const SurveyNet& net) {
   Views views;
-  for (const Station& station : net.stations) {
+  for (const SurveyStation& station : net.stations) {
     std::vector<Either>& view = views.emplace_back();
     for (const Sight& sight : station.sights) {
-      Either either = {&sight, {}, area_of(sight.found_px)};
+      Either either = {&sight, {}, area_of(sight.seen_px)};
       Pose pose;
       PoseUncertainty uncertainty;
-      if (marker_pose(net.camera, net.markers[sight.marker].size_m, kAnyDeviation_px, sight.found_px, pose,
+      if (marker_pose(net.camera, net.markers[sight.marker].size_m, kAnyDeviation_px, sight.seen_px, pose,
                       uncertainty)) {
         either.poses.push_back(pose);
         if (uncertainty.has_other) either.poses.push_back(uncertainty.other);
@@ -67,7 +67,7 @@ void add_corners(const SurveyNet& net, const Either& either, const Pose& place, 
   const double variance = kAnyDeviation_px * kAnyDeviation_px;
   const std::array<Vec3, 4> places = corner_places(factor * net.markers[either.sight->marker].size_m);
   for (std::size_t k = 0; k < 4; ++k) {
-    corners.push_back({transform(place, places[k]), either.sight->found_px[k], {variance, 0, variance}});
+    corners.push_back({transform(place, places[k]), either.sight->seen_px[k], {variance, 0, variance}});
   }
 }
 
@@ -191,7 +191,7 @@ void place_markers(SurveyNet& net, const Views& views, bool free_sizes) {
 }
 
 // The sight's mean square residual, px^2, or what is wrong enough.
-double misfit(const SurveyNet& net, const Station& station, const Sight& sight) {
+double misfit(const SurveyNet& net, const SurveyStation& station, const Sight& sight) {
   double sum = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     Vec2 off{};
@@ -202,13 +202,13 @@ double misfit(const SurveyNet& net, const Station& station, const Sight& sight) 
 }
 
 // The camera that most of the frame's markers agree about. Those that do are some hundredths of their size off at most.
-bool place_camera(const SurveyNet& net, const std::vector<Either>& view, Station& station) {
+bool place_camera(const SurveyNet& net, const std::vector<Either>& view, SurveyStation& station) {
   std::optional<Pose> best;
   double least = std::numeric_limits<double>::infinity();
   const auto tolerance = [](const Either& either) { return std::max(kWrong_px * kWrong_px, 0.01 * either.area_px2); };
   for (const Either& from : view) {
     for (const Pose& pose : from.poses) {
-      Station tried = station;
+      SurveyStation tried = station;
       tried.camera = compose(pose, inverse(net.markers[from.sight->marker].pose));
       double sum = 0;
       for (const Either& either : view) {
@@ -243,7 +243,7 @@ void start_net(SurveyNet& net, bool free_sizes) {
   place_markers(net, views, free_sizes);
   if (free_sizes) views = views_of(net);
   for (std::size_t s = 0; s < net.stations.size(); ++s) {
-    Station& station = net.stations[s];
+    SurveyStation& station = net.stations[s];
     // The views point into the station's sights, so those are dropped by their flags alone.
     if (place_camera(net, views[s], station)) continue;
     for (Sight& sight : station.sights) sight.kept = {};

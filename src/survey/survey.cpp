@@ -72,13 +72,13 @@ SurveyNet net_of(const SurveyFrames& frames, const CameraModel& camera, std::vec
   net.camera = camera;
   net.markers = std::move(markers);
   for (const SurveyFrame& frame : frames.frames()) {
-    Station station;
+    SurveyStation station;
     for (const Detection& seen : frame.markers) {
       for (std::size_t m = 0; m < net.markers.size(); ++m) {
         if (!is_of(net.markers[m], seen)) continue;
         Sight sight;
         sight.marker = m;
-        sight.found_px = seen.corners;
+        sight.seen_px = seen.corners;
         sight.covariances_px2 = corner_covariances(seen, deviation_px);
         sight.by_lines = !seen.corner_fit;
         station.sights.push_back(sight);
@@ -92,7 +92,7 @@ SurveyNet net_of(const SurveyFrames& frames, const CameraModel& camera, std::vec
 // The marker asked for, or the one in most frames; of equals the largest, whose pose is known best.
 bool choose_origin(const SurveyOptions& options, SurveyNet& net, std::vector<std::string>& objections) {
   std::vector<int> counts(net.markers.size());
-  for (const Station& station : net.stations) {
+  for (const SurveyStation& station : net.stations) {
     for (const Sight& sight : station.sights) ++counts[sight.marker];
   }
   bool found = false;
@@ -128,7 +128,7 @@ double view_range_deg(const SurveyNet& net) {
     middle = add(middle, scaled(marker.pose.t, 1 / static_cast<double>(net.markers.size())));
   }
   std::vector<Vec3> directions;
-  for (const Station& station : net.stations) {
+  for (const SurveyStation& station : net.stations) {
     if (station.is_used()) directions.push_back(normalized(add(inverse(station.camera).t, scaled(middle, -1))));
   }
   double least = 1;
@@ -141,7 +141,7 @@ double view_range_deg(const SurveyNet& net) {
 // Frames, corners, residuals. Returns the sum of squares of the kept corners, in standard deviations.
 double count(const SurveyNet& net, Survey& result) {
   result.markers.assign(net.markers.size(), {});
-  for (const Station& station : net.stations) {
+  for (const SurveyStation& station : net.stations) {
     if (!station.is_used()) continue;
     ++result.frames;
     for (const Sight& sight : station.sights) result.markers[sight.marker].frames += sight.is_kept() ? 1 : 0;
@@ -149,16 +149,17 @@ double count(const SurveyNet& net, Survey& result) {
   double whitened = 0;
   std::vector<double> squares(net.markers.size());
   std::vector<int> kept(net.markers.size());
-  each_corner(net, [&](const Station& station, const Sight& sight, std::size_t k, const Vec2& off, double square) {
-    SurveyedMarker& marker = result.markers[sight.marker];
-    ++marker.corners;
-    const bool fits = sight.is_kept() && sight.kept[k];
-    marker.rejected += fits ? 0 : 1;
-    if (!fits || !station.is_used()) return;
-    whitened += square;
-    squares[sight.marker] += off[0] * off[0] + off[1] * off[1];
-    ++kept[sight.marker];
-  });
+  each_corner(net,
+              [&](const SurveyStation& station, const Sight& sight, std::size_t k, const Vec2& off, double square) {
+                SurveyedMarker& marker = result.markers[sight.marker];
+                ++marker.corners;
+                const bool fits = sight.is_kept() && sight.kept[k];
+                marker.rejected += fits ? 0 : 1;
+                if (!fits || !station.is_used()) return;
+                whitened += square;
+                squares[sight.marker] += off[0] * off[0] + off[1] * off[1];
+                ++kept[sight.marker];
+              });
   double all = 0;
   int all_kept = 0;
   for (std::size_t m = 0; m < net.markers.size(); ++m) {
