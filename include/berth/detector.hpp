@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "berth/backend.hpp"
+#include "berth/bundle.hpp"
 #include "berth/camera.hpp"
 #include "berth/frame.hpp"
 #include "berth/image.hpp"
@@ -48,6 +49,10 @@ struct DetectorConfig {
   /// Camera and marker side (metres, the side the corners span); with both, detections get a pose.
   std::optional<CameraModel> camera;
   double marker_size_m = 0;
+  /// Markers that stand together; with a camera each bundle gets a pose, and its markers theirs by the sizes they have
+  /// in it, whatever marker_size_m is (0 then means that others get none). No marker may be in two of them, and their
+  /// families must be among `families`.
+  std::vector<Bundle> bundles;
   PoseMethod pose_method = PoseMethod::least_squares;
   CornerMethod corner_method = CornerMethod::edges;
   /// One standard deviation of a corner's coordinate, px: what poses' covariances go by (docs/pose.md) where the
@@ -63,7 +68,7 @@ struct DetectorConfig {
 /// Finds markers in frames of one size on one backend. All memory is taken in the constructor.
 class Detector {
  public:
-  /// Throws Error on a size outside 1…16384, an unknown family or a bad configuration.
+  /// Throws Error on a size outside 1…16384, an unknown family, a bundle that does not hold or a bad configuration.
   Detector(Backend& backend, int width, int height, const DetectorConfig& config);
   ~Detector();
   Detector(Detector&&) noexcept;

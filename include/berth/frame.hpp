@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "berth/bundle.hpp"
 #include "berth/image.hpp"
 #include "berth/marker.hpp"
 #include "berth/types.hpp"
@@ -46,6 +47,8 @@ struct FrameResult {
   FrameStamp stamp;
   FrameStatus status = FrameStatus::no_target;
   std::vector<Detection> detections;
+  /// One for each of DetectorConfig::bundles, in their order.
+  std::vector<BundlePose> bundles;
   /// Quadrilaterals that were examined for a code.
   int quads = 0;
   /// Run ends, contours and points of each search in turn (docs/marker-pipeline.md).

@@ -12,6 +12,7 @@
 #include "frame/quads.hpp"
 #include "frame/stages.hpp"
 #include "target/bent_sides.hpp"
+#include "target/bundle_pose.hpp"
 #include "target/decode.hpp"
 #include "target/marker_pose.hpp"
 #include "target/paper_p4p.hpp"
@@ -48,6 +49,29 @@ std::vector<const MarkerFamily*> find_families(const std::vector<std::string>& n
   std::vector<const MarkerFamily*> families;
   for (const std::string& name : names) families.push_back(&family(name));
   return families;
+}
+
+/// The solvers of the bundles, which must be of these families and have no marker in common.
+std::vector<BundlePoser> bundle_posers(const std::vector<Bundle>& bundles,
+                                       const std::vector<const MarkerFamily*>& families) {
+  std::vector<BundlePoser> posers;
+  for (const Bundle& bundle : bundles) {
+    bundle.check();
+    for (const BundleMarker& marker : bundle.markers) {
+      const std::string which = marker.family->name + " " + std::to_string(marker.id);
+      if (std::find(families.begin(), families.end(), marker.family) == families.end()) {
+        throw Error("bundle \"" + bundle.name + "\" has " + which + ", whose family is not looked for; add " +
+                    marker.family->name + " to the families");
+      }
+      for (const BundlePoser& other : posers) {
+        if (other.bundle().find(*marker.family, marker.id) == nullptr) continue;
+        throw Error(which + " is in the bundles \"" + other.bundle().name + "\" and \"" + bundle.name +
+                    "\"; keep it in one");
+      }
+    }
+    posers.emplace_back(bundle);
+  }
+  return posers;
 }
 
 using Corners = std::array<std::array<double, 2>, 4>;
@@ -119,10 +143,12 @@ class SearchResult {
 struct Detector::Impl {
   Impl(Backend& backend, int width, int height, const DetectorConfig& user_config)
       : config(user_config),
-        decoder(find_families(config.families), config.max_hamming),
+        families(find_families(config.families)),
+        decoder(families, config.max_hamming),
+        bundles(bundle_posers(config.bundles, families)),
         plan(backend, width, height, config),
         stream(backend.make_stream()) {
-    if (config.camera && !(config.marker_size_m > 0)) {
+    if (config.camera && !(config.marker_size_m > 0) && (bundles.empty() || config.marker_size_m != 0)) {
       throw Error("marker size is " + std::to_string(config.marker_size_m) + " m; give the side that the corners span");
     }
     if (!(config.corner_deviation_px > 0)) {
@@ -138,6 +164,7 @@ struct Detector::Impl {
       slots += static_cast<std::size_t>(search.geometry.max_contours);
     }
     result.detections.reserve(slots);
+    result.bundles.resize(bundles.size());
     refused.reserve(slots);
     if (!staging.empty()) {  // drivers may finish compiling at the first launch: not in the first frame's time
       stream->replay(plan.plan());
@@ -166,6 +193,7 @@ struct Detector::Impl {
 
   const FrameResult& collect() {
     result.detections.clear();
+    std::fill(result.bundles.begin(), result.bundles.end(), BundlePose{});
     refused.clear();
     result.digests.clear();
     result.quads = 0;
@@ -183,6 +211,9 @@ struct Detector::Impl {
     const Clock::time_point refined = Clock::now();
     if (config.camera) {
       for (Detection& detection : result.detections) add_pose(detection);
+      for (std::size_t i = 0; i < bundles.size(); ++i) {
+        bundles[i].find(*config.camera, result.detections, config.corner_deviation_px, result.bundles[i]);
+      }
     }
     const Clock::time_point posed = Clock::now();
     result.times = {StageTime{"device", ns_between(started, on_host)},
@@ -242,15 +273,25 @@ struct Detector::Impl {
     }
   }
 
+  double size_of(const Detection& d) const {
+    for (const BundlePoser& poser : bundles) {
+      if (const BundleMarker* marker = poser.bundle().find(*d.family, d.id)) return marker->size_m;
+    }
+    return config.marker_size_m;
+  }
+
   void add_pose(Detection& d) const {
     const CameraModel& camera = *config.camera;
+    const double size_m = size_of(d);
     d.pose_uncertainty.reset();
+    d.has_pose = false;
+    if (!(size_m > 0)) return;
     if (config.pose_method == PoseMethod::paper) {
-      d.has_pose = paper_p4p(camera, config.marker_size_m, d.corners, d.pose);
+      d.has_pose = paper_p4p(camera, size_m, d.corners, d.pose);
       return;
     }
-    d.has_pose = marker_pose(camera, config.marker_size_m, d.corners, corner_covariances(d, config.corner_deviation_px),
-                             d.pose, d.pose_uncertainty.emplace());
+    d.has_pose = marker_pose(camera, size_m, d.corners, corner_covariances(d, config.corner_deviation_px), d.pose,
+                             d.pose_uncertainty.emplace());
     if (!d.has_pose) d.pose_uncertainty.reset();
   }
 
@@ -275,7 +316,9 @@ struct Detector::Impl {
   }
 
   DetectorConfig config;
+  std::vector<const MarkerFamily*> families;
   Decoder decoder;
+  std::vector<BundlePoser> bundles;
   MarkerPlan plan;
   std::unique_ptr<Stream> stream;
   std::optional<PhotometricFit> fit;

@@ -5,23 +5,9 @@
 #include "pose_algebra.hpp"
 #include "target/planar_pose.hpp"
 #include "target/refine_pose.hpp"
-#include "target/symmetric.hpp"
 
 namespace berth {
-namespace {
-
-// Refinements nearer than this are one, in squares of standard deviations: a tenth of one.
-constexpr double kSame = 0.01;
-
-bool same(const RefinedPose& a, const RefinedPose& b) {
-  SquareMatrix<6> information{};
-  return invert<6>(a.covariance, information) && quadratic<6>(information, step_between(a.pose, b.pose)) < kSame;
-}
-
-// The marker's z axis points away from who sees its front.
-bool shows_front(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0; }
-
-}  // namespace
+bool faces_camera(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0; }
 
 CornerCovariances corner_covariances(const Detection& marker, double deviation_px) {
   if (marker.corner_fit) return marker.corner_fit->covariance_px2;
@@ -53,7 +39,7 @@ bool marker_pose(const CameraModel& camera, double size_m, const std::array<std:
   for (int k = 0; k < count; ++k) {
     RefinedPose& result = refined[found];
     if (refine_pose(camera, corners.data(), corners.size(), starts[static_cast<std::size_t>(k)], result) &&
-        shows_front(result.pose)) {
+        faces_camera(result.pose)) {
       ++found;
     }
   }
@@ -63,7 +49,7 @@ bool marker_pose(const CameraModel& camera, double size_m, const std::array<std:
   uncertainty = {};
   uncertainty.covariance = refined[0].covariance;
   uncertainty.error_px = refined[0].error_px;
-  if (found == 2 && !same(refined[0], refined[1])) {
+  if (found == 2 && !same_pose(refined[0], refined[1])) {
     uncertainty.has_other = true;
     uncertainty.other = refined[1].pose;
     uncertainty.other_error_px = refined[1].error_px;

@@ -14,6 +14,9 @@ using CornerCovariances = std::array<std::array<double, 3>, 4>;
 /// The marker's own where its corners were fitted, else one standard deviation of every coordinate, px.
 CornerCovariances corner_covariances(const Detection& marker, double deviation_px);
 
+/// Whether the camera sees the marker's front: its z axis points away then.
+bool faces_camera(const Pose& marker);
+
 /// A marker's four corners (paper's order) as refine_pose takes them.
 std::array<PoseCorner, 4> pose_corners(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
                                        const CornerCovariances& covariances_px2);

@@ -7,6 +7,9 @@
 namespace berth {
 namespace {
 
+// In squares of standard deviations.
+constexpr double kSame = 0.01;
+
 // Derivatives by translation, then rotation about the camera's axes.
 bool add_corner(const CameraModel& camera, const Pose& pose, const PoseCorner& corner, PoseNormal& normal) {
   const Vec3 arm = product(pose.R, corner.point_m);
@@ -44,6 +47,11 @@ bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size
   if (!least_squares_pose(start, linearise, result, squares_px)) return false;
   result.error_px = std::sqrt(squares_px / static_cast<double>(count));
   return true;
+}
+
+bool same_pose(const RefinedPose& a, const RefinedPose& b) {
+  SquareMatrix<6> information{};
+  return invert<6>(a.covariance, information) && quadratic<6>(information, step_between(a.pose, b.pose)) < kSame;
 }
 
 }  // namespace berth

@@ -42,4 +42,7 @@ struct RefinedPose {
 bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
                  RefinedPose& result, const PosePrior* prior = nullptr);
 
+/// Whether two refinements came to one pose: they differ by less than a tenth of the first's standard deviation.
+bool same_pose(const RefinedPose& a, const RefinedPose& b);
+
 }  // namespace berth
