@@ -8,6 +8,7 @@
 
 #include "annotate.hpp"
 #include "berth/error.hpp"
+#include "bundle_show.hpp"
 #include "camera/bad_input.hpp"
 #include "camera/image_file.hpp"
 #include "commands.hpp"
@@ -24,6 +25,7 @@ constexpr const char* kExamples = R"(Examples:
   berth detect --json photos/ more/*.png > markers.jsonl
   berth detect --family tag36h11,aruco4x4_50 --draw seen.png photo.jpg
   berth detect --camera cam.yaml --size 0.08 --draw annotated/ photos/
+  berth detect --camera cam.yaml --bundle dock.yaml photos/
 
 Corners start at the upper left of the upright marker and go counter-clockwise; pixel centres lie at integers.)";
 
@@ -90,7 +92,8 @@ class DrawTarget {
   std::set<std::string> used_;
 };
 
-void print_table(Console& console, const std::string& image, const TimedResult& result) {
+void print_table(Console& console, const std::string& image, const TimedResult& result,
+                 const std::vector<Bundle>& bundles) {
   const std::vector<Detection>& detections = result.frame.detections;
   console.out() << fmt::format("{}: {} marker{}, {:.3f} ms\n", image, detections.size(),
                                detections.size() == 1 ? "" : "s", ms_of(result.cpu_ns));
@@ -103,6 +106,9 @@ void print_table(Console& console, const std::string& image, const TimedResult& 
                                    std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]));
     }
     console.out() << '\n';
+  }
+  for (std::size_t i = 0; i < bundles.size(); ++i) {
+    console.out() << "  " << describe(bundles[i].name, result.frame.bundles[i]) << '\n';
   }
 }
 
@@ -124,12 +130,12 @@ void detect_one(const std::string& path, const DetectOptions& options, Engine& e
   }
   warn_of_overflow(console, path, result.frame);
   if (options.json) {
-    console.out() << to_line({{"image", path},
-                              {"ms", ms_of(result.cpu_ns)},
-                              {"detections", to_json(result.frame.detections)}})
-                  << '\n';
+    Json line = {{"image", path}, {"ms", ms_of(result.cpu_ns)}, {"detections", to_json(result.frame.detections)}};
+    const std::vector<Bundle>& bundles = engine.config().bundles;
+    if (!bundles.empty()) line["bundles"] = to_json(result.frame.bundles, bundles);
+    console.out() << to_line(line) << '\n';
   } else {
-    print_table(console, path, result);
+    print_table(console, path, result, engine.config().bundles);
   }
   const std::string refusal = engine.pose_refusal(image.width(), image.height());
   if (!refusal.empty()) console.complain(path + ": " + refusal + " (" + options.engine.camera_file + ")");
@@ -141,8 +147,9 @@ void detect_one(const std::string& path, const DetectOptions& options, Engine& e
 
 void run_detect(const DetectOptions& options, Console& console) {
   DetectorConfig config = make_config(options.engine);
-  if (options.engine.camera_file.empty() != options.engine.size.empty()) {
-    console.note(std::string("no poses: ") + (options.engine.size.empty() ? "--size" : "--camera") + " is missing");
+  const bool has_sizes = !options.engine.size.empty() || !config.bundles.empty();
+  if (options.engine.camera_file.empty() == has_sizes) {
+    console.note(std::string("no poses: ") + (has_sizes ? "--camera" : "--size") + " is missing");
   }
   const std::vector<std::string> paths = expand(options, console);
   DrawTarget draw(options.draw, paths.size());

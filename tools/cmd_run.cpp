@@ -13,6 +13,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
   berth run --source dir:recording/ --json - | jq .detections
   berth run --source sim:scenarios/approach.toml --filter --json log.jsonl
+  berth run --source sim:scenarios/approach.toml --bundle bundles/approach.yaml
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
 

@@ -72,6 +72,13 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
           std::map<std::string, CameraFit>{{"resize", CameraFit::resize}, {"crop", CameraFit::crop}}))
       ->type_name("HOW");
   command.add_option("--size", options.size, "side of the marker's border square, metres")->type_name("METRES");
+  command
+      .add_option(
+          "--bundle", options.bundle_files,
+          "markers that stand together, one pose for all: tag_bundles YAML, or a WPILib field layout in JSON whose "
+          "markers are of --size; may be repeated")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
   command.add_option("--pose", options.pose, "how poses are had: least-squares, or the paper's closed form")
       ->check(CLI::IsMember({"least-squares", "paper"}))
       ->capture_default_str();
@@ -157,6 +164,13 @@ EngineBackends open_chosen_backends(const EngineOptions& options) {
   return opened;
 }
 
+double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id) {
+  for (const Bundle& bundle : config.bundles) {
+    if (const BundleMarker* marker = bundle.find(family, id)) return marker->size_m;
+  }
+  return config.marker_size_m;
+}
+
 double parse_size(const std::string& text) {
   std::istringstream stream(text);
   stream.imbue(std::locale::classic());
@@ -175,6 +189,29 @@ CornerMethod corner_method(const EngineOptions& options) {
   return options.corners == "photometric" ? CornerMethod::photometric : CornerMethod::edges;
 }
 
+namespace {
+
+/// Reads the bundles, and has their families looked for: with none named, theirs alone.
+void add_bundles(const EngineOptions& options, DetectorConfig& config) {
+  if (options.bundle_files.empty()) return;
+  if (options.families.empty()) config.families.clear();
+  // A field layout names no family: the one that is asked for, if it is one.
+  const std::string usual =
+      options.families.size() == 1 && options.families[0] != "all" ? options.families[0] : DetectorConfig().families[0];
+  for (const std::string& file : options.bundle_files) {
+    for (Bundle& bundle : read_bundles(file, config.marker_size_m, usual)) config.bundles.push_back(std::move(bundle));
+  }
+  std::vector<std::string>& families = config.families;
+  for (const Bundle& bundle : config.bundles) {
+    for (const BundleMarker& marker : bundle.markers) {
+      const std::string& name = marker.family->name;
+      if (std::find(families.begin(), families.end(), name) == families.end()) families.push_back(name);
+    }
+  }
+}
+
+}  // namespace
+
 DetectorConfig make_config(const EngineOptions& options) {
   DetectorConfig config;
   if (!options.families.empty()) config.families = options.families;
@@ -191,6 +228,7 @@ DetectorConfig make_config(const EngineOptions& options) {
   }
   config.max_hamming = options.max_hamming;
   if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
+  add_bundles(options, config);
   if (options.pose == "paper") config.pose_method = PoseMethod::paper;
   config.corner_method = corner_method(options);
   if (!options.camera_file.empty()) config.camera = read_camera(options.camera_file);
@@ -208,7 +246,8 @@ std::string Engine::describe() const {
 }
 
 std::string Engine::pose_refusal(int width, int height) const {
-  if (!config_.camera || !(config_.marker_size_m > 0) || camera_for(width, height)) return "";
+  if (!config_.camera || (!(config_.marker_size_m > 0) && config_.bundles.empty()) || camera_for(width, height))
+    return "";
   const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
   return "field 'size' is " + size(width, height) + ", but the camera file's image is " +
          size(config_.camera->width, config_.camera->height) +
@@ -242,7 +281,7 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
   DetectorConfig config = config_;
   config.camera = camera_for(image.width, image.height);
-  if (!(config.marker_size_m > 0)) config.camera.reset();
+  if (!(config.marker_size_m > 0) && config.bundles.empty()) config.camera.reset();
   if (!config.camera) config.marker_size_m = 0;
   Sized sized{image.width, image.height, nullptr, nullptr};
   std::vector<Backend*> chain;

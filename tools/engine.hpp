@@ -21,6 +21,8 @@ struct EngineOptions {
   std::string camera_file;
   CameraFit camera_fit = CameraFit::none;
   std::string size;
+  /// Files of bundles.
+  std::vector<std::string> bundle_files;
   std::string pose = "least-squares";
   std::string corners = "edges";
   std::string backend;
@@ -41,7 +43,7 @@ struct EngineBackends {
 
 /// --backend, --device, --threads
 void add_backend_options(CLI::App& command, EngineOptions& options);
-/// The above and --family, --camera, --size, --max-hamming
+/// The above and --family, --camera, --size, --bundle, --max-hamming
 void add_engine_options(CLI::App& command, EngineOptions& options);
 
 /// --corners
@@ -54,8 +56,12 @@ void add_stream_backend_options(CLI::App& command, EngineOptions& options);
 /// The backend asked for, or the first of backend_names() that opens, with its fall-back; or the pair. Throws Error.
 EngineBackends open_chosen_backends(const EngineOptions& options);
 
-/// Checks every value; throws Error that names the field, its value and the remedy.
+/// Checks every value, reads the files named, and adds the bundles' families to those looked for; throws Error that
+/// names the field, its value and the remedy.
 DetectorConfig make_config(const EngineOptions& options);
+
+/// The side that a marker's pose goes by: its bundle's, else the configuration's.
+double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id);
 
 /// A marker side in metres as typed. Throws Error unless it is a finite number above 0 and at most 1000.
 double parse_size(const std::string& text);

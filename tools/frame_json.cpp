@@ -39,6 +39,21 @@ Json to_json(const std::vector<Detection>& detections) {
   return json;
 }
 
+Json to_json(const std::vector<BundlePose>& poses, const std::vector<Bundle>& bundles) {
+  Json json = Json::array();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const BundlePose& pose = poses[i];
+    json.push_back({{"name", bundles[i].name},
+                    {"used", pose.used},
+                    {"kept_out", pose.kept_out},
+                    {"corners_kept_out", pose.corners_kept_out}});
+    if (!pose.has_pose) continue;
+    json.back()["pose"] = to_json(pose.pose);
+    add_uncertainty(pose.uncertainty, json.back()["pose"]);
+  }
+  return json;
+}
+
 Json to_json(const TruthMarker& marker) {
   return {{"family", marker.family},   {"id", marker.id},           {"size", marker.size_m},
           {"visible", marker.visible}, {"corners", marker.corners}, {"pose", to_json(marker.pose)}};

@@ -15,6 +15,8 @@ using Json = nlohmann::ordered_json;
 Json to_json(const Detection& detection);
 Json to_json(const std::vector<Detection>& detections);
 Json to_json(const TruthMarker& marker);
+/// Of every bundle that was asked for: name, how many of its markers went into the pose, the pose where there is one.
+Json to_json(const std::vector<BundlePose>& poses, const std::vector<Bundle>& bundles);
 
 /// One frame of a stream's log. `label` names the frame in its source; truth and digests only where there are any.
 Json to_json(const FrameResult& frame, const std::string& label, std::int64_t cpu_ns,

@@ -1,5 +1,6 @@
 #include "marker_filters.hpp"
 
+#include "engine.hpp"
 #include "truth_score.hpp"
 
 namespace berth::cli {
@@ -21,7 +22,7 @@ void MarkerFilters::update(const FrameResult& frame, const DetectorConfig& confi
     const std::pair<std::string, int> key = {detection.family->name, detection.id};
     if (!detection.has_pose || tracks_.count(key) != 0 || tracks_.size() == kMost) continue;
     const TruthMarker* marker = truth_of(detection, truth);
-    const double size_m = marker != nullptr ? marker->size_m : config.marker_size_m;
+    const double size_m = marker != nullptr ? marker->size_m : marker_size_m(config, *detection.family, detection.id);
     tracks_.emplace(key, Track{PoseFilter(config_for(config, size_m)), detection.family, {}});
   }
   poses_.clear();

@@ -18,8 +18,8 @@ class MarkerFilters {
   /// Markers beyond so many are not filtered.
   static constexpr std::size_t kMost = 64;
 
-  /// Takes a frame: detections with poses of markers whose size is the configuration's, or the truth's where it has
-  /// one.
+  /// Takes a frame: detections with poses of markers whose size is their bundle's or the configuration's, or the
+  /// truth's where it has one.
   void update(const FrameResult& frame, const DetectorConfig& config, const std::vector<TruthMarker>& truth);
 
   /// Every marker with a track: family, id, pose, velocity and what is known of them.

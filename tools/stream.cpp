@@ -11,6 +11,7 @@
 
 #include "annotate.hpp"
 #include "berth/error.hpp"
+#include "bundle_show.hpp"
 #include "frame_json.hpp"
 #include "interrupt.hpp"
 #include "live_view.hpp"
@@ -76,8 +77,9 @@ class StreamRun {
     size_given_ = config.marker_size_m > 0;
     // With sizes known by marker, poses are computed for one metre and scaled: t is proportional to the size.
     if (!size_given_ && !frame.truth.empty()) config.marker_size_m = 1;
-    if (!config.camera && size_given_) console_.note("no poses: --camera is missing");
-    if (config.camera && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
+    const bool has_sizes = size_given_ || !config.bundles.empty();
+    if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
+    if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
     engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit);
     people_ << "backend " << engine_->describe() << '\n';
@@ -106,11 +108,14 @@ class StreamRun {
     if (!options_.log.empty()) {
       std::ostream& log = options_.log == "-" ? console_.out() : log_;
       Json line = to_json(result, frame.label, timed.cpu_ns, frame.truth);
+      const std::vector<Bundle>& bundles = engine_->config().bundles;
+      if (!bundles.empty()) line["bundles"] = to_json(result.bundles, bundles);
       if (options_.filter) line["filtered"] = filters_.to_json();
       log << to_line(line) << '\n';
     }
     if (!frame.truth.empty()) {
       score_.add(frame.truth, result.detections);
+      score_bundles(result, frame.truth);
       has_truth_ = true;
     }
     if (!options_.svg.empty()) remember_ways(result.detections, frame.truth);
@@ -142,12 +147,29 @@ class StreamRun {
   void scale_poses(std::vector<Detection>& detections, const std::vector<TruthMarker>& truth) const {
     for (Detection& detection : detections) {
       if (!detection.has_pose) continue;
+      if (in_bundle(detection)) continue;
       const TruthMarker* marker = truth_of(detection, truth);
       if (marker != nullptr) {
         scale_pose(marker->size_m / engine_->config().marker_size_m, detection);
       } else if (!size_given_) {
         detection.has_pose = false;
       }
+    }
+  }
+
+  /// Whether its pose goes by the size that its bundle gives it.
+  bool in_bundle(const Detection& detection) const {
+    const std::vector<Bundle>& bundles = engine_->config().bundles;
+    return std::any_of(bundles.begin(), bundles.end(),
+                       [&](const Bundle& bundle) { return bundle.find(*detection.family, detection.id) != nullptr; });
+  }
+
+  void score_bundles(const FrameResult& result, const std::vector<TruthMarker>& truth) {
+    for (std::size_t i = 0; i < result.bundles.size(); ++i) {
+      const Bundle& bundle = engine_->config().bundles[i];
+      Pose true_pose;
+      if (!truth_of(bundle, truth, true_pose)) continue;
+      score_.add_bundle(bundle.name, result.bundles[i].has_pose ? &result.bundles[i].pose : nullptr, true_pose);
     }
   }
 
@@ -180,6 +202,9 @@ class StreamRun {
         largest = &d;
         brief = fmt::format("id {} {}", d.id, place);
       }
+    }
+    for (std::size_t i = 0; i < result.bundles.size(); ++i) {
+      table.push_back("  " + describe(engine_->config().bundles[i].name, result.bundles[i]));
     }
     view_.show(frames_, line, table, brief);
   }
@@ -254,7 +279,9 @@ class StreamRun {
     trajectory.title = fmt::format("{} {} in the camera frame, {} of {} frames", most->first.first, most->first.second,
                                    found(most->second), frames_);
     const auto scored = score_.markers().find(most->first);
-    trajectory.size_m = scored != score_.markers().end() ? scored->second.size_m : engine_->config().marker_size_m;
+    trajectory.size_m = scored != score_.markers().end()
+                            ? scored->second.size_m
+                            : marker_size_m(engine_->config(), family(most->first.first), most->first.second);
     trajectory.points = most->second;
     write_file(options_.svg, "the drawing", trajectory_svg(trajectory));
     people_ << "trajectory  " << options_.svg << '\n';

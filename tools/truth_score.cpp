@@ -80,15 +80,25 @@ void TruthScore::add(const std::vector<TruthMarker>& truth, const std::vector<De
   }
 }
 
+void TruthScore::add_bundle(const std::string& name, const Pose* pose, const Pose& truth) {
+  BundleScore& score = bundles_[name];
+  ++score.frames;
+  if (pose == nullptr) return;
+  const double off_m = distance_m(*pose, truth);
+  score.position_mm.push_back(off_m * 1000);
+  score.position_percent.push_back(off_m / distance_m(Pose(), truth) * 100);
+  score.rotation_deg.push_back(angle_deg(*pose, truth));
+}
+
 void TruthScore::print(std::ostream& out) const {
   out << "errors against the simulator's truth (median / largest)\n"
       << fmt::format("  {:<22} {:>5} {:>13} {:>15} {:>17} {:>15} {:>17}\n", "marker", "mm", "found", "corners px",
                      "position mm", "% of range", "rotation deg");
+  const auto pair = [](const std::vector<double>& values, int digits) {
+    if (values.empty()) return std::string("-");
+    return fmt::format("{:.{}f} / {:.{}f}", median(values), digits, largest(values), digits);
+  };
   for (const auto& [key, score] : markers_) {
-    const auto pair = [](const std::vector<double>& values, int digits) {
-      if (values.empty()) return std::string("-");
-      return fmt::format("{:.{}f} / {:.{}f}", median(values), digits, largest(values), digits);
-    };
     const double rate = score.shown == 0 ? 0 : 100.0 * score.found / score.shown;
     out << fmt::format(
         "  {:<22} {:>5.0f} {:>13} {:>15} {:>17} {:>15} {:>17}\n", fmt::format("{} {}", key.first, key.second),
@@ -96,6 +106,11 @@ void TruthScore::print(std::ostream& out) const {
         score.shown == 0 ? std::string("never whole") : fmt::format("{}/{} {:.0f}%", score.found, score.shown, rate),
         pair(score.corner_px, 3), pair(score.position_mm, 2), pair(score.position_percent, 3),
         pair(score.rotation_deg, 3));
+  }
+  for (const auto& [name, score] : bundles_) {
+    out << fmt::format("  {:<22} {:>5} {:>13} {:>15} {:>17} {:>15} {:>17}\n", "bundle " + name, "",
+                       fmt::format("{}/{}", score.position_mm.size(), score.frames), "", pair(score.position_mm, 2),
+                       pair(score.position_percent, 3), pair(score.rotation_deg, 3));
   }
   out << "  false positives: " << false_positives_ << '\n';
 }

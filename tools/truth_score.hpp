@@ -20,20 +20,32 @@ struct MarkerScore {
   std::vector<double> corner_px, position_mm, position_percent, rotation_deg;
 };
 
+/// One bundle of a simulated stream, frame by frame in which it had a pose.
+struct BundleScore {
+  int frames = 0;
+  std::vector<double> position_mm, position_percent, rotation_deg;
+};
+
 /// Compares detections with a simulator's truth.
 class TruthScore {
  public:
   void add(const std::vector<TruthMarker>& truth, const std::vector<Detection>& detections);
 
+  /// A frame's pose of a bundle and what it truly is; null where there was no pose.
+  void add_bundle(const std::string& name, const Pose* pose, const Pose& truth);
+
   /// By family and id.
   const std::map<std::pair<std::string, int>, MarkerScore>& markers() const { return markers_; }
   /// Detections of markers that the frame did not show.
   int false_positives() const { return false_positives_; }
-  /// The table: a row a marker, medians and maxima.
+  /// By name.
+  const std::map<std::string, BundleScore>& bundles() const { return bundles_; }
+  /// The table: a row a marker, then a row a bundle; medians and maxima.
   void print(std::ostream& out) const;
 
  private:
   std::map<std::pair<std::string, int>, MarkerScore> markers_;
+  std::map<std::string, BundleScore> bundles_;
   int false_positives_ = 0;
 };
 
