@@ -220,5 +220,13 @@ TEST(Bundle, ChecksWhatCodeMadeOfIt) {
   EXPECT_THAT(complaint([&] { bundle.check(); }), HasSubstr("finite place"));
 }
 
+TEST(BundleFile, ThoseThatComeWithBerthAreRead) {
+  const Bundle approach = read_bundles(std::string(BERTH_SOURCE_DIR) + "/bundles/approach.yaml").at(0);
+  EXPECT_EQ(approach.markers.size(), 5u);
+  const Bundle nested = read_bundles(std::string(BERTH_SOURCE_DIR) + "/bundles/nested.yaml").at(0);
+  EXPECT_EQ(nested.markers.at(0).pose.t, nested.markers.at(1).pose.t);
+  EXPECT_EQ(nested.markers.at(0).family, &family("tagCustom48h12"));
+}
+
 }  // namespace
 }  // namespace berth
