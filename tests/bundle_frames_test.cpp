@@ -235,8 +235,8 @@ TEST(CliBundle, RunScoresThemAgainstTheTruth) {
 TEST(CliBundle, FieldLayoutsTakeTheSizeThatIsGiven) {
   const ScratchFolder folder;
   const std::string image = std::string(BERTH_TEST_DATA) + "/tag36h11_7.png";
-  const std::string field = folder.write(
-      "field.json", std::string(R"({"tags": [{"ID": 7, "pose": {"translation": {"x": 1, "y": 2, "z": 3},
+  const std::string field =
+      folder.write("field.json", std::string(R"({"tags": [{"ID": 7, "pose": {"translation": {"x": 1, "y": 2, "z": 3},
   "rotation": {"quaternion": {"W": 1, "X": 0, "Y": 0, "Z": 0}}}}], "field": {"length": 16.5, "width": 8.2}})"));
   const CommandRun unsized = run_berth({"detect", "--bundle", field, image});
   EXPECT_EQ(unsized.exit_code, 2);

@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "berth/bundle.hpp"
 #include "berth/detector.hpp"
+#include "berth/error.hpp"
 #include "support/command_run.hpp"
 #include "support/scratch_folder.hpp"
 #include "tag_sheet.hpp"
@@ -64,6 +66,72 @@ TEST(TagSheet, IsReadBackAtItsSize) {
       EXPECT_NEAR(c[0][1] - first[1], static_cast<double>(row) * sheet.pitch_mm() * kDots, 1);
     }
   }
+}
+
+TEST(BundleSheet, IsReadBackInItsPlaces) {
+  for (const char* name : {"approach", "nested"}) {
+    SCOPED_TRACE(name);
+    Bundle bundle = read_bundles(std::string(BERTH_SOURCE_DIR) + "/bundles/" + name + ".yaml").at(0);
+    BundleMarker& last = bundle.markers.back();  // on its side: x is down on the page, y left
+    const std::array<double, 9> on_side = {0, -1, 0, -1, 0, 0, 0, 0, -1};
+    last.pose.R = on_side;
+    const GrayImage image = rasterised(cli::draw_bundle(bundle, 297, 420), 297, 420);
+    const auto backend = open_backend("simd");
+    DetectorConfig config;
+    config.families = {last.family->name};
+    Detector detector(*backend, image.width(), image.height(), config);
+    std::vector<Detection> found = detector.detect(image.view()).detections;
+    ASSERT_EQ(found.size(), bundle.markers.size());
+    std::sort(found.begin(), found.end(), [](const Detection& a, const Detection& b) { return a.id < b.id; });
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const BundleMarker& marker = bundle.markers[i];
+      // The file's y is up, the page's down.
+      EXPECT_NEAR(found[i].center[0] - found[0].center[0], marker.pose.t[0] * 1000 * kDots, 1);
+      EXPECT_NEAR(found[i].center[1] - found[0].center[1], -marker.pose.t[1] * 1000 * kDots, 1);
+      const auto& c = found[i].corners;
+      const std::size_t along = &marker == &last ? 1 : 0;
+      EXPECT_NEAR(c[3][along] - c[0][along], marker.size_m * 1000 * kDots, 0.7) << "its x";
+    }
+  }
+}
+
+std::string complaint_about(const Bundle& bundle) {
+  try {
+    cli::draw_bundle(bundle, 297, 420);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(BundleSheet, IsRefusedWhereItCannotBePrinted) {
+  const Bundle nested = read_bundles(std::string(BERTH_SOURCE_DIR) + "/bundles/nested.yaml").at(0);
+  EXPECT_EQ(complaint_about(nested), "");
+  Bundle bundle = nested;
+  bundle.markers[1].pose.t[0] = 0.02;
+  EXPECT_THAT(complaint_about(bundle), HasSubstr("tagCustom48h12 1 stands on tagCustom48h12 0"));
+  bundle.markers[1].pose.t = {0, 0, 0.01};
+  EXPECT_THAT(complaint_about(bundle), HasSubstr("not in the plane"));
+  bundle = nested;
+  bundle.markers[1].size_m = bundle.markers[0].size_m;
+  EXPECT_THAT(complaint_about(bundle), HasSubstr("overlap"));
+  bundle.markers[1].pose.t = {1, 0, 0};
+  EXPECT_THAT(complaint_about(bundle), HasSubstr("larger --paper"));
+  bundle.markers[1].pose.R = {0.8, 0.6, 0, 0.6, -0.8, 0, 0, 0, -1};
+  EXPECT_THAT(complaint_about(bundle), HasSubstr("turned by quarters"));
+}
+
+TEST(CliPrintTag, PrintsABundle) {
+  const test::ScratchFolder folder;
+  const std::string file = std::string(BERTH_SOURCE_DIR) + "/bundles/nested.yaml";
+  const auto run = test::run_berth({"print-tag", "--bundle", file, "--paper", "a3", "--out", folder / "board.pdf"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(test::text_of(folder / "board.pdf"), StartsWith("%PDF-1.6"));
+  EXPECT_THAT(run.out, HasSubstr("bundle nested, 2 markers"));
+  EXPECT_EQ(test::run_berth({"print-tag", "--out", folder / "no.pdf"}).exit_code, 2);
+  const auto both = test::run_berth({"print-tag", "tag36h11", "7", "--bundle", file, "--out", folder / "no.pdf"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("leave FAMILY"));
 }
 
 TEST(CliPrintTag, WritesAPageOfTrueSize) {

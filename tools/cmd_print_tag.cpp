@@ -17,6 +17,7 @@ constexpr const char* kExamples = R"(Examples:
   berth print-tag tag36h11 7 --size 0.08 --out tag.pdf
   berth print-tag tagStandard41h12 0 --size 0.03 --grid 4x5 --out sheet.svg
   berth print-tag aruco4x4_50 3 --size 0.2 --paper a3 --out tag.pdf
+  berth print-tag --bundle bundles/nested.yaml --paper a3 --out board.pdf
 
 --size is the side of the square that the corners span, the one to give to --size of detect and run; a ruler on the page
 shows whether the printer kept to it.)";
@@ -26,6 +27,7 @@ struct PrintCommand {
   std::string grid = "1x1";
   std::string paper = "a4";
   std::string out;
+  std::string bundle;
   int id = 0;
   double size_m = 0;
   double gap_m = 0;
@@ -45,7 +47,7 @@ bool ends_with(const std::string& text, const std::string& end) {
 
 TagSheet sheet_of(const PrintCommand& command) {
   TagSheet sheet;
-  sheet.family = &family(command.family);
+  if (!command.family.empty()) sheet.family = &family(command.family);
   sheet.first_id = command.id;
   sheet.side_mm = command.size_m * 1000;
   sheet.gap_mm = command.gap_m * 1000;
@@ -73,7 +75,22 @@ TagSheet sheet_of(const PrintCommand& command) {
 int print_tag(const PrintCommand& command, Console& console) {
   const bool pdf = ends_with(command.out, ".pdf");
   if (!pdf && !ends_with(command.out, ".svg")) throw Error("--out '" + command.out + "': name a .pdf or .svg file");
+  if (command.bundle.empty() && (command.family.empty() || !(command.size_m > 0))) {
+    throw Error("print-tag needs FAMILY, ID and --size, or --bundle FILE; see berth print-tag --help");
+  }
+  if (!command.bundle.empty() && (!command.family.empty() || command.size_m > 0)) {
+    throw Error("--bundle says itself which markers and how large; leave FAMILY, ID and --size out");
+  }
   const TagSheet sheet = sheet_of(command);
+  if (!command.bundle.empty()) {
+    const std::vector<Bundle> bundles = read_bundles(command.bundle);
+    if (bundles.size() > 1) throw Error(command.bundle + ": several bundles; give a file of one");
+    const PrintPage page = draw_bundle(bundles[0], sheet.width_mm, sheet.height_mm);
+    write_file(command.out, "the page", pdf ? page.pdf() : page.svg());
+    console.out() << fmt::format("{}: bundle {}, {} markers; print at 100 % and check the ruler\n", command.out,
+                                 bundles[0].name, bundles[0].markers.size());
+    return kOk;
+  }
   const PrintPage page = draw_sheet(sheet);
   write_file(command.out, "the page", pdf ? page.pdf() : page.svg());
   console.out() << fmt::format("{}: {} {}, {:.4g} mm; print at 100 % and check the ruler\n", command.out,
@@ -86,12 +103,13 @@ int print_tag(const PrintCommand& command, Console& console) {
 void add_print_tag(CLI::App& app, Console& console, int& exit_code) {
   CLI::App* command = app.add_subcommand("print-tag", "Markers on paper, at true size, as PDF or SVG");
   const auto options = std::make_shared<PrintCommand>();
-  command->add_option("family", options->family, "marker family")->type_name("FAMILY")->required();
-  command->add_option("id", options->id, "marker, or the first of a grid")->type_name("ID")->required();
+  command->add_option("family", options->family, "marker family")->type_name("FAMILY");
+  command->add_option("id", options->id, "marker, or the first of a grid")->type_name("ID");
   command->add_option("--size", options->size_m, "side of the square that the corners span, metres")
       ->type_name("METRES")
-      ->check(CLI::Range(0.001, 10.0))
-      ->required();
+      ->check(CLI::Range(0.001, 10.0));
+  command->add_option("--bundle", options->bundle, "instead: the flat bundle of a file, every marker in its place")
+      ->type_name("FILE");
   command->add_option("--out", options->out, "a .pdf or .svg file")->type_name("FILE")->required();
   command->add_option("--grid", options->grid, "columns x rows of consecutive ids")->capture_default_str();
   command->add_option("--gap", options->gap_m, "between neighbouring squares, metres [two modules of white]")

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "berth/error.hpp"
+#include "pose_algebra.hpp"
 #include "target/marker_pattern.hpp"
 
 namespace berth::cli {
@@ -113,6 +114,131 @@ PrintPage draw_sheet(const TagSheet& sheet) {
   // The marker's axes (docs/coordinate-frames.md), beside the first one's upper left corner; z is into the paper.
   arrow(page, left - 3, top - 3, 1, 0, "x");
   arrow(page, left - 3, top - 3, 0, 1, "y");
+  return page;
+}
+
+namespace {
+
+/// A marker of a bundle on paper: its middle, and how its x and y lie there (quarter turns).
+struct Placed {
+  const BundleMarker* marker;
+  double x, y;
+  std::array<int, 4> turn;  // row-major
+
+  double module_mm() const { return marker->size_m * 1000 / marker->family->border_width; }
+  /// Half of what is printed of it.
+  double half_mm() const { return module_mm() * marker->family->total_width / 2; }
+  /// A rectangle of its modules, from the upper left of its print, on the page.
+  PrintPage::Rectangle modules(double left, double top, double across, double down) const {
+    const double x0 = left * module_mm() - half_mm(), y0 = top * module_mm() - half_mm();
+    const double x1 = x0 + across * module_mm(), y1 = y0 + down * module_mm();
+    const double ax = turn[0] * x0 + turn[1] * y0, ay = turn[2] * x0 + turn[3] * y0;
+    const double bx = turn[0] * x1 + turn[1] * y1, by = turn[2] * x1 + turn[3] * y1;
+    return {x + std::min(ax, bx), y + std::min(ay, by), std::fabs(bx - ax), std::fabs(by - ay)};
+  }
+  PrintPage::Rectangle print() const { return modules(0, 0, marker->family->total_width, marker->family->total_width); }
+};
+
+constexpr double kTouch_mm = 0.01;
+
+bool overlap(const PrintPage::Rectangle& a, const PrintPage::Rectangle& b) {
+  return a.x + a.width > b.x + kTouch_mm && b.x + b.width > a.x + kTouch_mm && a.y + a.height > b.y + kTouch_mm &&
+         b.y + b.height > a.y + kTouch_mm;
+}
+
+std::string name_of(const BundleMarker& marker) { return fmt::format("{} {}", marker.family->name, marker.id); }
+
+std::vector<Placed> places_on_paper(const Bundle& bundle) {
+  const Pose paper = inverse(bundle.markers.at(0).pose);
+  std::vector<Placed> all;
+  for (const BundleMarker& marker : bundle.markers) {
+    const Pose pose = compose(paper, marker.pose);
+    if (std::fabs(pose.t[2]) * 1000 > kTouch_mm || pose.R[8] < 1 - 1e-6) {
+      throw Error(fmt::format("bundle \"{}\": {} is not in the plane of {}, facing the same way; print it by itself",
+                              bundle.name, name_of(marker), name_of(bundle.markers[0])));
+    }
+    Placed placed{&marker, pose.t[0] * 1000, pose.t[1] * 1000, {}};
+    const std::array<double, 4> turn = {pose.R[0], pose.R[1], pose.R[3], pose.R[4]};
+    for (std::size_t i = 0; i < 4; ++i) {
+      placed.turn[i] = static_cast<int>(std::lround(turn[i]));
+      if (std::fabs(turn[i] - placed.turn[i]) < 1e-5) continue;
+      throw Error(fmt::format("bundle \"{}\": {} is not turned by quarters against {}; print it by itself", bundle.name,
+                              name_of(marker), name_of(bundle.markers[0])));
+    }
+    all.push_back(placed);
+  }
+  return all;
+}
+
+/// Whether the module carries nothing, so that a smaller marker may stand there: inside of the border and no bit.
+bool is_free(const MarkerFamily& family, int x, int y) {
+  const int offset = (family.total_width - family.border_width) / 2, last = family.border_width - 2;
+  const int column = x - offset, row = y - offset;
+  if (column < 1 || row < 1 || column > last || row > last) return false;
+  for (std::size_t i = 0; i < family.bit_x.size(); ++i) {
+    if (family.bit_x[i] == column && family.bit_y[i] == row) return false;
+  }
+  return true;
+}
+
+/// The dark modules of a marker, without those where a smaller one stands.
+void draw_placed(const Placed& placed, const std::vector<Placed>& all, PrintPage& page) {
+  const MarkerFamily& family = *placed.marker->family;
+  const std::vector<u8> pattern = marker_pattern(family, placed.marker->id);
+  for (int i = 0; i < family.total_width * family.total_width; ++i) {
+    const int x = i % family.total_width, y = i / family.total_width;
+    const PrintPage::Rectangle module = placed.modules(x, y, 1, 1);
+    const Placed* on_top = nullptr;
+    for (const Placed& other : all) {
+      if (other.marker != placed.marker && other.module_mm() < placed.module_mm() && overlap(module, other.print())) {
+        on_top = &other;
+      }
+    }
+    if (on_top != nullptr && !is_free(family, x, y)) {
+      throw Error(fmt::format("{} stands on {}, which is not free there; move it or make it smaller",
+                              name_of(*on_top->marker), name_of(*placed.marker)));
+    }
+    if (on_top == nullptr && pattern[static_cast<std::size_t>(i)] == 0) {
+      page.rectangle(module.x, module.y, module.width, module.height);
+    }
+  }
+}
+
+}  // namespace
+
+PrintPage draw_bundle(const Bundle& bundle, double width_mm, double height_mm) {
+  bundle.check();
+  std::vector<Placed> all = places_on_paper(bundle);
+  double left = all[0].x, right = all[0].x, top = all[0].y, bottom = all[0].y;
+  for (const Placed& placed : all) {
+    const double reach = placed.half_mm() + placed.module_mm();
+    left = std::min(left, placed.x - reach), right = std::max(right, placed.x + reach);
+    top = std::min(top, placed.y - reach), bottom = std::max(bottom, placed.y + reach);
+    for (const Placed& other : all) {
+      if (&other == &placed || other.module_mm() != placed.module_mm() || !overlap(other.print(), placed.print())) {
+        continue;
+      }
+      throw Error(name_of(*placed.marker) + " and " + name_of(*other.marker) + " overlap; move one of them");
+    }
+  }
+  const double width = width_mm - 2 * kMargin_mm, height = height_mm - 2 * kMargin_mm - kFooter_mm;
+  if (width < kRuler_mm || right - left > width || bottom - top > height) {
+    throw Error(
+        fmt::format("{:.4g} x {:.4g} mm of markers on a page with room for {:.4g} x {:.4g}; choose larger --paper",
+                    right - left, bottom - top, width, height));
+  }
+  const double shift_x = (width_mm - (left + right)) / 2;
+  const double shift_y = kMargin_mm + (height - (bottom - top)) / 2 - top;
+  for (Placed& placed : all) placed.x += shift_x, placed.y += shift_y;
+  PrintPage page(width_mm, height_mm);
+  for (const Placed& placed : all) draw_placed(placed, all, page);
+  const Placed& first = all[0];
+  const double below = bottom + shift_y + 4, side_mm = first.marker->size_m * 1000;
+  dimension(page, first.x - side_mm / 2, first.x + side_mm / 2, below,
+            fmt::format("{:.4g} mm: {}", side_mm, name_of(*first.marker)));
+  const double words = std::clamp(left + shift_x, kMargin_mm, width_mm - kMargin_mm - kRuler_mm);
+  page.text(words, below + 9, 3, fmt::format("bundle, {} markers; print at 100 %", all.size()));
+  ruler(page, words, below + 13);
   return page;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "berth/bundle.hpp"
 #include "berth/marker.hpp"
 #include "print_page.hpp"
 
@@ -24,5 +25,10 @@ struct TagSheet {
 /// The sheet in the middle of its page: cutting lines, the measured side, the marker's axes, a ruler of 100 mm to check
 /// the printer by. Throws Error where the page is too small, neighbours would overlap, or the family has too few ids.
 PrintPage draw_sheet(const TagSheet& sheet);
+
+/// A bundle's markers in their places on a page of that size, upright as the first of them is, with the same aids.
+/// Throws Error unless they lie in one plane, face one way, are turned by quarters against each other, and fit: into
+/// the page, and beside each other or into the free middle of a larger one.
+PrintPage draw_bundle(const Bundle& bundle, double width_mm, double height_mm);
 
 }  // namespace berth::cli
