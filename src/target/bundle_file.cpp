@@ -43,7 +43,7 @@ class Field {
   bool has(const std::string& key) const { return node_.IsMap() && static_cast<bool>(node_[key]); }
   Field at(const std::string& key, const std::string& remedy) const {
     if (!node_.IsMap()) fail("not a map", remedy);
-    const Field inner(path_, name_.empty() ? key : name_ + "." + key, node_[key]);
+    Field inner(path_, name_.empty() ? key : name_ + "." + key, node_[key]);
     if (!inner.node_) inner.fail("missing", remedy);
     return inner;
   }

@@ -34,6 +34,12 @@ double squares_off(const CameraModel& camera, const Pose& pose, const PoseCorner
   return squares < kBehind ? squares : kBehind;
 }
 
+// The same one in a million of chi-square with many degrees of freedom (Cornish and Fisher's expansion, to the skew).
+double sum_bound(double freedom) {
+  constexpr double kNormal = 4.753;
+  return freedom + kNormal * std::sqrt(2 * freedom) + (kNormal * kNormal - 1) * 2 / 3;
+}
+
 // What a plane seen in direction `line` through it becomes when depths along the line change sign: the other of the two
 // poses that a plane seen from far away may have. A rotation again, since the plane is mirrored in itself too.
 Mat3 tilted_the_other_way(const Mat3& r, const Vec3& line, const Vec3& normal) {
@@ -228,7 +234,9 @@ bool BundlePoser::solve(const CameraModel& camera, const Pose& start, std::size_
   const bool all_before = take_within(kBehind / 2);
   if (all_before && fit(camera, start, result)) {
     evaluate(camera, result.pose);
+    // Of their sum too: a marker a little out of place may pull the others along until each is within its bound.
     const bool all_fit =
+        result.chi_square <= sum_bound(2 * static_cast<double>(corners_.size()) - 6) &&
         std::all_of(squares_.begin(), squares_.end(), [](double squares) { return squares <= kBound; });
     if (all_fit || sightings_.size() == 1) return true;  // nothing tells that a single marker is wrong
   }
