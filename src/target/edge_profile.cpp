@@ -24,17 +24,35 @@ double normal_area(double t, double density) {
   return density * sum;
 }
 
-std::int16_t q14(double value) {
-  const double scaled = value * 16384;
-  return static_cast<std::int16_t>(scaled < 0 ? scaled - 0.5 : scaled + 0.5);
+std::int16_t rounded(double value) { return static_cast<std::int16_t>(value < 0 ? value - 0.5 : value + 0.5); }
+std::int16_t q14(double value) { return rounded(value * 16384); }
+
+double density_at(double t) { return kInverseRootTwoPi * exp_minus(t * t / 2); }
+
+// Hermite's cubics through values and slopes at the pieces' ends; the last ends level. The scale leaves room for what
+// rounding adds.
+EdgePieces make_pieces() {
+  constexpr double kLength = 0.5, kOne = 32764;
+  EdgePieces pieces;
+  for (std::size_t k = 0; k < 8; ++k) {
+    const double from = kLength * static_cast<double>(k), to = from + kLength;
+    const double slope = density_at(from), end_slope = k == 7 ? 0 : density_at(to);
+    const double value = 2 * normal_area(from, slope), end = k == 7 ? 1 : 2 * normal_area(to, end_slope);
+    const double m = 2 * slope * kLength, end_m = 2 * end_slope * kLength;
+    pieces[0][k] = rounded(kOne * value);
+    pieces[1][k] = rounded(kOne * m);
+    pieces[2][k] = rounded(kOne * (3 * (end - value) - 2 * m - end_m));
+    pieces[3][k] = rounded(kOne * (2 * (value - end) + m + end_m));
+  }
+  return pieces;
 }
 
 }  // namespace
 
-EdgeProfile::EdgeProfile() {
+EdgeProfile::EdgeProfile() : pieces_(make_pieces()) {
   for (int i = 0; i <= 2 * kMiddle; ++i) {
     const double t = static_cast<double>(i - kMiddle) / (1 << kPerDeviation_bits);
-    const double density = kInverseRootTwoPi * exp_minus(t * t / 2);
+    const double density = density_at(t);
     points_[static_cast<std::size_t>(i)] = {q14(0.5 + normal_area(t, density)), q14(density), q14(t * density)};
   }
   points_.front() = {0, 0, 0};

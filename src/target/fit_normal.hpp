@@ -51,14 +51,23 @@ class FitNormal {
   double squares() const { return squares_; }
   /// The step that makes the sum of squares least, of the levels alone or of all unknowns; those left out step 0.
   /// Returns false where it is not determined.
+  /// `factor`: the equations' Cholesky factor, the lower triangle.
   bool solve_levels(FitVector& step) const;
-  bool solve(FitVector& step, FitMatrix& inverse) const;
+  bool solve(FitVector& step, FitMatrix& factor) const;
 
  private:
+  FitMatrix lower() const;
+
   Tones tones_;
-  FitMatrix matrix_ = {};  // lower triangle
+  // The upper triangle counts. Rows are padded to whole vectors.
+  static constexpr std::size_t kWidth = 24;
+  alignas(32) std::array<std::array<double, kWidth>, kUnknowns> rows_ = {};
   FitVector gradient_ = {};
   double squares_ = 0;
 };
+
+/// A linear function of the field's eight unknowns as a vector of which the products with another such vector are their
+/// covariance, per grey level² of noise: the last unknowns of factor⁻¹ field, the others being 0.
+std::array<double, kUnknowns - kField> whitened(const FitMatrix& factor, const std::array<double, 8>& field);
 
 }  // namespace berth

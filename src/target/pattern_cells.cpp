@@ -33,6 +33,20 @@ PatternCell cell_of(const std::array<std::array<signed char, 3>, 3>& seen) {
   return cell;
 }
 
+// From the modules before and after two lines: upper left, upper right, lower left, lower right.
+void set_node(const std::array<signed char, 4>& seen, std::size_t at, PatternNodes& nodes) {
+  bool known = true;
+  for (const signed char tone : seen) known = known && tone != kOpen;
+  const auto sum = [&](int a, int b, int c, int d) {
+    return static_cast<signed char>(known ? 8 * (a * seen[0] + b * seen[1] + c * seen[2] + d * seen[3]) : 0);
+  };
+  nodes.even[at] = sum(1, 1, 1, 1);
+  nodes.by_u[at] = sum(-1, 1, -1, 1);
+  nodes.by_v[at] = sum(-1, -1, 1, 1);
+  nodes.both[at] = sum(1, -1, -1, 1);
+  nodes.known[at] = known ? -1 : 0;
+}
+
 }  // namespace
 
 void PatternCells::set(const MarkerFamily& family, int id) {
@@ -65,6 +79,16 @@ void PatternCells::set(const MarkerFamily& family, int id) {
         }
       }
       cells_[static_cast<std::size_t>(row * kMost + column)] = cell_of(seen);
+    }
+  }
+  for (int row = first_ - 2; row <= last() + 3; ++row) {
+    for (int column = first_ - 2; column <= last() + 3; ++column) {
+      std::array<signed char, 4> seen;
+      for (int k = 0; k < 4; ++k) {
+        seen[static_cast<std::size_t>(k)] =
+            modules[inside(row - 1 + k / 2 - first_)][inside(column - 1 + k % 2 - first_)];
+      }
+      set_node(seen, node(column, row), nodes_);
     }
   }
 }

@@ -58,6 +58,7 @@ struct Edges {
 };
 
 int q12(int value_q14) { return (value_q14 + 2) >> 2; }
+int q11(int value_q12) { return (value_q12 + 1) >> 1; }
 int product_q12(int value_q28) { return (value_q28 + (1 << 15)) >> 16; }
 
 // The pattern near a corner of a module: each row of three is a profile along u, profiles along v blend the rows.
@@ -117,8 +118,8 @@ Seen look(const PatternCell& cell, const EdgeProfile& profile, const BlockModel&
 void fill_channels(View2D<const u8> image, const PatternCells& cells, const EdgeProfile& profile, const BlockModel& m,
                    int row_step, BlockChannels& channels) {
   for (auto& channel : channels.values) channel.fill(0);
-  channels.pixels = channels.on_edges = channels.saturated = channels.outliers = 0;
-  channels.even = channels.pairs = channels.even_squares = channels.pair_products = 0;
+  PixelCounts& counts = channels.counts;
+  counts = {};
   for (int dy = -4; dy < 4; dy += row_step) {
     if (m.y + dy >= image.height) break;
     const u8* const row = image.row(m.y + dy);
@@ -133,7 +134,7 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
       if (cell.kind == PatternCell::kUnknown) continue;
       const int grey = row[m.x + dx];
       if (grey == 0 || grey == 255) {
-        ++channels.saturated;
+        ++counts.saturated;
         continue;
       }
       Seen seen{};
@@ -146,35 +147,32 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
       const int shown = seen.level + ((m.tone * tone + 2048) >> 12);
       const int dark = (m.dark[0] + m.dark[1] * dx + m.dark[2] * dy) >> 8;
       const int contrast = (m.contrast[0] + m.contrast[1] * dx + m.contrast[2] * dy) >> 8;
-      const int residual = grey * 32 - dark - ((contrast * shown + 2048) >> 12);
-      if (residual > m.most_residual || residual < -m.most_residual) {
-        ++channels.outliers;
-        continue;
-      }
-      ++channels.pixels;
+      const int residual = (grey * 32 - dark - ((contrast * shown + 2048) >> 12) + 1) >> 1;
+      if (residual > m.most_residual || residual < -m.most_residual) continue;
+      ++counts.pixels;
       const bool on_edge = (seen.slope_u | seen.slope_v) != 0;
-      channels.on_edges += on_edge ? 1 : 0;
+      counts.on_edges += on_edge ? 1 : 0;
       const std::size_t i = static_cast<std::size_t>(slot(dx + 4, dy + 4));
       const auto put = [&](Channel channel, int value) {
         channels.values[channel][i] = static_cast<std::int16_t>(value);
       };
       put(kOne, 1);
-      put(kLevel, shown);
+      put(kLevel, q11(shown));
       put(kResidual, residual);
       if (!on_edge) {
         before = residual;
-        ++channels.even;
-        channels.even_squares += residual * residual;
+        ++counts.even;
+        counts.even_squares += residual * residual;
         if (left_residual != kNone) {
-          ++channels.pairs;
-          channels.pair_products += left_residual * residual;
+          ++counts.pairs;
+          counts.pair_products += left_residual * residual;
         }
         continue;
       }
-      put(kTone, tone);
+      put(kTone, q11(tone));
       // The tone curve's own steepness here.
       const int steep = 4096 + ((m.tone * (4096 - 2 * seen.level) + 2048) >> 12);
-      const auto steeper = [&](int value) { return (value * steep + 2048) >> 12; };
+      const auto steeper = [&](int value) { return (value * steep + 4096) >> 13; };
       put(kSlopeU, steeper(seen.slope_u));
       put(kSlopeV, steeper(seen.slope_v));
       put(kSpreadU, steeper(seen.spread_u));
@@ -184,23 +182,43 @@ void fill_channels(View2D<const u8> image, const PatternCells& cells, const Edge
   }
 }
 
-void sum_products(const BlockChannels& channels, int first, int count, ChannelSums& sums) {
-  const auto is_seen = [&](std::size_t channel) {
-    return channels.on_edges > 0 || channel == kOne || channel == kLevel || channel == kResidual;
-  };
+void add_products(const BlockChannels& channels, int first, int count, PlaceSums& sums) {
+  std::size_t product = 0;
   for (std::size_t a = 0; a < kChannels; ++a) {
-    for (std::size_t b = a; b < kChannels; ++b) {
-      if (!is_seen(a) || !is_seen(b)) {
-        sums[a][b] = 0;
-        continue;
-      }
+    for (std::size_t b = a; b < kChannels; ++b, ++product) {
       const std::int16_t* const p = channels.values[a].data() + first;
       const std::int16_t* const q = channels.values[b].data() + first;
       std::int32_t sum = 0;
       for (int i = 0; i < count; ++i) sum += static_cast<std::int32_t>(p[i]) * q[i];
-      sums[a][b] = sum;
+      sums.lanes[product][0] += sum;
     }
   }
+}
+
+void PlaceSums::clear() {
+  for (auto& row : lanes) row.fill(0);
+}
+
+void PlaceSums::add(const PixelCounts& c) {
+  const std::int32_t values[] = {c.pixels, c.on_edges, c.saturated, c.even, c.pairs, c.even_squares, c.pair_products};
+  for (std::size_t k = 0; k < kRows - kPixels; ++k) lanes[kPixels + k][0] += values[k];
+}
+
+std::int32_t PlaceSums::total(std::size_t row) const {
+  std::int32_t sum = 0;
+  for (const std::int32_t lane : lanes[row]) sum += lane;
+  return sum;
+}
+
+ChannelSums PlaceSums::products() const {
+  ChannelSums sums;
+  for (std::size_t k = 0; k < kProducts; ++k) sums[k] = total(k);
+  return sums;
+}
+
+PixelCounts PlaceSums::counts() const {
+  return {total(kPixels), total(kOnEdges),     total(kSaturated),   total(kEven),
+          total(kPairs),  total(kEvenSquares), total(kPairProducts)};
 }
 
 }  // namespace berth

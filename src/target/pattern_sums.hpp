@@ -26,44 +26,75 @@ struct BlockModel {
   int tone = 0;
   /// Grey levels q13 of dark, and from dark to light: coefficients of 1, dx, dy.
   std::array<int, 3> dark = {}, contrast = {};
-  /// Pixels further than this from the model are left out, grey levels q5.
+  /// Pixels further than this from the model are left out, grey levels q4.
   int most_residual = 0;
 };
 
 /// What each pixel of a block adds to the fit; products of every two are summed.
 enum Channel : int {
   kOne,       // 1
-  kLevel,     // P: 0 where the pattern is dark, 1 where it is light, with the tone curve's part, q12
-  kTone,      // P (1 - P), q12
+  kLevel,     // P: 0 where the pattern is dark, 1 where it is light, with the tone curve's part, q11
+  kTone,      // P (1 - P), q11
   kSlopeU,    // dP/du and
-  kSlopeV,    // dP/dv, times the blur's deviation there, q12
+  kSlopeV,    // dP/dv, times the blur's deviation there, q11
   kSpreadU,   // minus dP by the logarithm of the blur's deviation along u
-  kSpreadV,   // and v, q12
-  kTwist,     // dP by the correlation of the blur's parts along u and v, q12
-  kResidual,  // grey levels q5
+  kSpreadV,   // and v, q11
+  kTwist,     // dP by the correlation of the blur's parts along u and v, q11
+  kResidual,  // grey levels q4
   kChannels
 };
 
-/// Sums over a quarter of a block, 4 × 4 pixels, or a whole one. Every entry is below 2^30 in size: 64 · 2^12 · 2^12.
-using ChannelSums = std::array<std::array<std::int32_t, kChannels>, kChannels>;
+/// Products of two channels, row by row of the upper triangle.
+constexpr int kProducts = kChannels * (kChannels + 1) / 2;
+
+/// Sums over a place: a quarter of a block, a block, or four. Every entry is below 2^31 in size: 256 · 2355² are,
+/// levels being below 1.15 with the tone curve's part, everything else below 2^11.
+using ChannelSums = std::array<std::int32_t, kProducts>;
+
+/// Pixels told apart.
+struct PixelCounts {
+  /// Those that count; those among them that see an edge; those left out for being 0 or 255.
+  int pixels = 0, on_edges = 0, saturated = 0;
+  /// Pixels that count and see no edge; those among them whose left neighbour in the block is another.
+  int even = 0, pairs = 0;
+  /// Of the even ones' residuals the sum of squares, of pairs the sum of products, q8.
+  std::int32_t even_squares = 0, pair_products = 0;
+};
+
+/// Sums of a place as they grow, a row each: products, then what PixelCounts holds, in its order. Totals over the lanes
+/// count, not which pixels a lane took.
+struct PlaceSums {
+  static constexpr std::size_t kLanes = 8;
+  enum Row : std::size_t {
+    kPixels = kProducts,
+    kOnEdges,
+    kSaturated,
+    kEven,
+    kPairs,
+    kEvenSquares,
+    kPairProducts,
+    kRows
+  };
+  alignas(32) std::array<std::array<std::int32_t, kLanes>, kRows> lanes;
+
+  void clear();
+  void add(const PixelCounts& counts);
+  std::int32_t total(std::size_t row) const;
+  ChannelSums products() const;
+  PixelCounts counts() const;
+};
 
 /// A block's pixels, channel by channel, quarter by quarter; what was left out is 0 in every channel.
 struct BlockChannels {
   alignas(32) std::array<std::array<std::int16_t, 64>, kChannels> values;
-  /// Pixels that count; those among them that see an edge; those left out for being 0 or 255, and for being too far
-  /// off.
-  int pixels = 0, on_edges = 0, saturated = 0, outliers = 0;
-  /// Pixels that count and see no edge, and the sum of their residuals' squares, q10; those among them whose left
-  /// neighbour in the block is another, and the sum of the products of both residuals.
-  int even = 0, pairs = 0;
-  std::int32_t even_squares = 0, pair_products = 0;
+  PixelCounts counts;
 };
 
 /// Compares a block with the model. `row_step`: every row, or every second.
 void fill_channels(View2D<const u8> image, const PatternCells& cells, const EdgeProfile& profile,
                    const BlockModel& model, int row_step, BlockChannels& channels);
 
-/// Sums of products over pixels [first, first + count): a quarter (16) or all (64). Upper triangle only.
-void sum_products(const BlockChannels& channels, int first, int count, ChannelSums& sums);
+/// Adds the products of pixels [first, first + count): a quarter (16) or all (64).
+void add_products(const BlockChannels& channels, int first, int count, PlaceSums& sums);
 
 }  // namespace berth

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "target/first_levels.hpp"
 #include "target/fit_normal.hpp"
 #include "target/fit_pass.hpp"
 
@@ -15,7 +16,7 @@ constexpr int kPatience = 4;
 // While the blur changes by little, the next step is some twentieth of the one before, if that is a small part of the
 // blur. So a step below this many of the deviations that the noise leaves open, within these bounds, is the last if it
 // changes the blur's variance by a share below that.
-constexpr double kLastStepDeviations = 4;
+constexpr double kLastStepDeviations = 6;
 constexpr double kLastStepFrom_px = 0.01, kLastStepTo_px = 0.03;
 constexpr double kLeastBlurChange = 0.1;
 // Corners that are known no better than this are not worth having, px.
@@ -93,17 +94,6 @@ FieldToCorners corners_of_field(const MarkerMap& map, double border) {
   return result;
 }
 
-// Covariance of two corner coordinates, per grey level² of noise.
-double covariance(const FieldToCorners& corners, const FitMatrix& inverse, std::size_t i, std::size_t j) {
-  double sum = 0;
-  for (std::size_t k = 0; k < 8; ++k) {
-    double with = 0;
-    for (std::size_t l = 0; l < 8; ++l) with += inverse[(kField + k) * kUnknowns + kField + l] * corners[j][l];
-    sum += corners[i][k] * with;
-  }
-  return sum;
-}
-
 double side_of(const Corners& corners) {
   double sum = 0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -143,8 +133,8 @@ class Step {
     noise_ = std::max(kLeastNoise, normal.squares() / pass_.pixels);
     add_priors(state_, noise_, normal);
     FitVector step;
-    FitMatrix inverse;
-    if (!normal.solve(step, inverse) || !move_levels(step, state_)) return false;
+    FitMatrix factor;
+    if (!normal.solve(step, factor) || !move_levels(step, state_)) return false;
     const double trace = state_.blur[0] + state_.blur[2];
     move_blur(step, state_.blur);
     blur_change_ = std::fabs(state_.blur[0] + state_.blur[2] - trace) / trace;
@@ -155,9 +145,13 @@ class Step {
       for (std::size_t axis = 0; axis < 2; ++axis) {
         for (std::size_t k = 0; k < 8; ++k) state_.corners[i][axis] += corners[2 * i + axis][k] * step[kField + k];
       }
-      const double xx = noise_ * covariance(corners, inverse, 2 * i, 2 * i);
-      const double xy = noise_ * covariance(corners, inverse, 2 * i, 2 * i + 1);
-      const double yy = noise_ * covariance(corners, inverse, 2 * i + 1, 2 * i + 1);
+      const auto x = whitened(factor, corners[2 * i]), y = whitened(factor, corners[2 * i + 1]);
+      double xx = 0, xy = 0, yy = 0;
+      for (std::size_t k = 0; k < x.size(); ++k) {
+        xx += noise_ * x[k] * x[k];
+        xy += noise_ * x[k] * y[k];
+        yy += noise_ * y[k] * y[k];
+      }
       covariance_px2_[i] = {xx, xy, yy};
       variances += xx + yy;
     }
@@ -196,12 +190,18 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
   const FitScene scene{image, lens_, profile_, cells_, static_cast<double>(family.border_width)};
 
   const bool small = state.side_px < kSmall_px;
-  // Levels alone, from mid-grey, so that no residual is beyond 128.
-  state.dark[0] = 128;
   FitPass pass(Tones::smooth);
-  FitVector step;
-  if (!pass.run(scene, state, small ? 1 : kRowSteps[0]) || !pass.normal.solve_levels(step) || !move_levels(step, state))
+  if (!first_levels(scene, state)) {
+    // Levels alone from all pixels, and from mid-grey, so that no residual is beyond 128.
+    state.dark[0] = 128;
+    FitVector step;
+    if (!pass.run(scene, state, small ? 1 : kRowSteps[0]) || !pass.normal.solve_levels(step) ||
+        !move_levels(step, state)) {
+      return false;
+    }
+  } else if (!(state.contrast[0] > kLeastContrast)) {
     return false;
+  }
 
   Tones tones = Tones::smooth;
   state.most_residual = kMostLimit;
