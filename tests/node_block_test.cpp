@@ -1,9 +1,9 @@
-// A block's sums by vectors against their definition, on every instruction set that this machine has: the same integers.
+// A block's sums by vectors against their definition, on every instruction set that this machine has: the same
+// integers.
 
 #include "target/node_block.hpp"
 
 #include <gtest/gtest.h>
-
 #include <hwy/targets.h>
 
 #include <random>

@@ -39,8 +39,8 @@ struct NodeSpan {
   // `q`: marker coordinate, modules.
   explicit NodeSpan(const Quadratic& q) {
     constexpr double kRounding = 1e-3;
-    const double reach = 4 * (std::fabs(q.x) + std::fabs(q.y)) +
-                         16 * (std::fabs(q.xx) + std::fabs(q.xy) + std::fabs(q.yy)) + kRounding;
+    const double reach =
+        4 * (std::fabs(q.x) + std::fabs(q.y)) + 16 * (std::fabs(q.xx) + std::fabs(q.xy) + std::fabs(q.yy)) + kRounding;
     low = q.c - reach;
     high = q.c + reach;
     fits = low > -64 && high < 64;

@@ -35,6 +35,16 @@ struct FitPlace {
 /// which follow the edge of a shadow and cost a part of the accuracy.
 enum class Tones { smooth, local };
 
+/// Sums of the normal equations: products of the unknowns' derivatives, of which the upper triangle counts, in rows
+/// that are padded to whole vectors; those with the residuals; the residuals' squares.
+struct FitEquations {
+  static constexpr std::size_t kWidth = 24;
+  using Row = std::array<double, kWidth>;
+  alignas(32) std::array<Row, kUnknowns> rows = {};
+  FitVector gradient = {};
+  double squares = 0;
+};
+
 /// Normal equations of the fit, from integer sums that are added in a fixed order.
 ///
 /// A displacement of the pattern is a projective vector field, (c0 + c1 a + c2 b + a w, c3 + c4 a + c5 b + b w) with
@@ -43,12 +53,12 @@ class FitNormal {
  public:
   explicit FitNormal(Tones tones) : tones_(tones) {}
 
-  void add(const FitPlace& where, const ChannelSums& integers, bool has_edges);
+  void add(const FitPlace& place, const PlaceSums& sums);
   /// Pulls the sum of the unknowns times `factors`, now `value` away from where it is expected, with this weight.
   void add_prior(const FitVector& factors, double value, double weight);
 
   /// Sum of the residuals' squares, grey levels²; without each place's own levels where tones are local.
-  double squares() const { return squares_; }
+  double squares() const { return equations_.squares; }
   /// The step that makes the sum of squares least, of the levels alone or of all unknowns; those left out step 0.
   /// Returns false where it is not determined.
   /// `factor`: the equations' Cholesky factor, the lower triangle.
@@ -59,11 +69,7 @@ class FitNormal {
   FitMatrix lower() const;
 
   Tones tones_;
-  // The upper triangle counts. Rows are padded to whole vectors.
-  static constexpr std::size_t kWidth = 24;
-  alignas(32) std::array<std::array<double, kWidth>, kUnknowns> rows_ = {};
-  FitVector gradient_ = {};
-  double squares_ = 0;
+  FitEquations equations_;
 };
 
 /// A linear function of the field's eight unknowns as a vector of which the products with another such vector are their

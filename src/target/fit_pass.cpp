@@ -25,7 +25,7 @@ struct Part {
 
 double bend(const Quadratic& q) { return std::fabs(q.xx) + std::fabs(q.xy) + std::fabs(q.yy); }
 
-// Blocks of a place: those inside of up to two by two.
+// Blocks of a place: up to four, those taken that are not outside.
 class Parts {
  public:
   void clear() { count_ = 0; }
@@ -89,23 +89,33 @@ void FitPass::count(const PixelCounts& counts) {
   pair_products_ += counts.pair_products;
 }
 
-bool FitPass::run(const FitScene& scene, const FitState& state, int row_step) {
+bool FitPass::run(const FitScene& scene, const FitState& state, Share share) {
   if (!map.set(scene.lens, state.corners, scene.border, 1)) return false;
   BlockModels models(scene, state, map);
   const BlockModels::Range range = models.range();
   const double half = scene.border / 2;
   const bool in_quarters = state.side_px < kQuarters_px;
-  const int step = state.side_px < kFours_px || tones_ == Tones::local ? 1 : 2;
+  const bool is_large = state.side_px >= kFours_px && tones_ == Tones::smooth;
+  // A place is this many blocks wide. Of a quarter of the pixels it has as many as of all in one half as wide.
+  const int step = (is_large ? 2 : 1) * (share == Share::quarter ? 2 : 1);
+  const int row_step = share == Share::quarter && !is_large ? 2 : 1;
+  const auto is_taken = [&](int column, int row) {
+    if (share == Share::all) return true;
+    // One block of every two by two, elsewhere in the next; or every second row of every second block.
+    return is_large ? (column & 1) == (row >> 1 & 1) && (row & 1) == (column >> 1 & 1) : ((column + row) & 1) == 0;
+  };
   BlockChannels channels;
   NodeBlock block;
   block.row_step = row_step;
   PlaceSums sums;
   Parts parts;
-  for (int top = range.top; top <= range.bottom; top += step) {
-    for (int left = range.left; left <= range.right; left += step) {
+  // From even blocks on, so that no place has more than four that are taken.
+  for (int top = range.top & ~1; top <= range.bottom; top += step) {
+    for (int left = range.left & ~1; left <= range.right; left += step) {
       parts.clear();
       for (int row = top; row < top + step && row <= range.bottom; ++row) {
         for (int column = left; column < left + step && column <= range.right; ++column) {
+          if (!is_taken(column, row)) continue;
           Part& part = parts.next();
           part.column = column;
           part.row = row;
@@ -137,8 +147,8 @@ bool FitPass::run(const FitScene& scene, const FitState& state, int row_step) {
             const double dx = quarter % 2 == 0 ? -2.5 : 1.5, dy = quarter < 2 ? -2.5 : 1.5;
             sums.clear();
             add_products(channels, 16 * quarter, 16, sums);
-            normal.add(place_of(parts, models, blur, u, v, half, dx, dy), sums.products(),
-                       channels.counts.on_edges > 0);
+            sums.add(channels.counts);
+            normal.add(place_of(parts, models, blur, u, v, half, dx, dy), sums);
           }
           break;
         }
@@ -150,7 +160,7 @@ bool FitPass::run(const FitScene& scene, const FitState& state, int row_step) {
       count(counts);
       // The middle of the pixels -4 … 3.
       if (counts.pixels > 0) {
-        normal.add(place_of(parts, models, blur, u, v, half, -0.5, -0.5), sums.products(), counts.on_edges > 0);
+        normal.add(place_of(parts, models, blur, u, v, half, -0.5, -0.5), sums);
       }
     }
   }

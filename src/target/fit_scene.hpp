@@ -3,10 +3,10 @@
 #include <array>
 
 #include "berth/image.hpp"
-#include "target/quad_map.hpp"
 #include "target/edge_profile.hpp"
 #include "target/lens_blocks.hpp"
 #include "target/pattern_cells.hpp"
+#include "target/quad_map.hpp"
 
 namespace berth {
 

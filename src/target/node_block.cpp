@@ -1,5 +1,5 @@
-// The definition of a block's sums in 16 bits. A product keeps 15 bits fewer than it has, rounded: what vectors of every
-// kind have an instruction for.
+// The definition of a block's sums in 16 bits. A product keeps 15 bits fewer than it has, rounded: what vectors of
+// every kind have an instruction for.
 #include "target/node_block.hpp"
 
 #include <algorithm>

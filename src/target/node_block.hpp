@@ -9,16 +9,16 @@
 
 namespace berth {
 
-/// What the model says of a block of 8 × 8 pixels whose modules are wide against the blur, so that a pixel sees one edge
-/// along each axis at most, those of the nearest node: in 16 bits, sixteen pixels a vector. Places are about the block's
-/// middle, dx and dy from -4 to 3.
+/// What the model says of a block of 8 × 8 pixels whose modules are wide against the blur, so that a pixel sees one
+/// edge along each axis at most, those of the nearest node: in 16 bits, sixteen pixels a vector. Places are about the
+/// block's middle, dx and dy from -4 to 3.
 struct NodeBlock {
   /// Pixel of dx = dy = 0; all 64 lie in the image.
   int x = 0, y = 0;
   /// Rows -4, -4 + row_step, … are taken: 1, 2 or 4.
   int row_step = 1;
-  /// Modules q16 from half a module before the first node: coefficients of 1, dx, dy, dx², dx dy, dy². From 0 to below 4
-  /// at every pixel.
+  /// Modules q16 from half a module before the first node: coefficients of 1, dx, dy, dx², dx dy, dy². From 0 to below
+  /// 4 at every pixel.
   std::array<std::int32_t, 6> u = {}, v = {};
   /// Pixels outside are left out, the same scale; `whole` says that none is.
   std::int32_t u_first = 0, u_last = 0, v_first = 0, v_last = 0;

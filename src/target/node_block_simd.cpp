@@ -43,20 +43,17 @@ HWY_INLINE V16 look_up_256(V16 table, V16 bytes) {
   return hn::BitCast(D16(), hn::TableLookupBytesOr0(hn::BitCast(Bytes(), table), hn::BitCast(Bytes(), bytes)));
 }
 
-// A coordinate's quadratic for the left and the right half of rows: in 32-bit lanes, four pixels of one row, then of the
-// next; packed to 16 bits, both halves are whole rows.
+// A coordinate's quadratic for the left and the right half of rows: in 32-bit lanes, four pixels of one row, then of
+// the next; packed to 16 bits, both halves are whole rows.
 class Coordinate {
  public:
   explicit HWY_INLINE Coordinate(const std::array<std::int32_t, 6>& q) : yy_(hn::Set(D32(), q[5])) {
-    alignas(16) std::int32_t start[8], across[8];
-    for (int i = 0; i < 8; ++i) {
-      const int dx = i - 4;
-      start[i] = q[0] + q[1] * dx + q[3] * (dx * dx);
-      across[i] = q[2] + q[4] * dx;
-    }
+    alignas(16) static constexpr std::int32_t kColumns[8] = {-4, -3, -2, -1, 0, 1, 2, 3};
+    const auto same = [](std::int32_t value) HWY_ATTR { return hn::Set(D32(), value); };
     for (std::size_t half = 0; half < 2; ++half) {
-      start_[half] = hn::LoadDup128(D32(), start + 4 * half);
-      across_[half] = hn::LoadDup128(D32(), across + 4 * half);
+      const V32 dx = hn::LoadDup128(D32(), kColumns + 4 * half);
+      start_[half] = hn::Add(same(q[0]), hn::Mul(dx, hn::Add(same(q[1]), hn::Mul(dx, same(q[3])))));
+      across_[half] = hn::Add(same(q[2]), hn::Mul(dx, same(q[4])));
     }
   }
   HWY_INLINE V32 at(std::size_t half, V32 dy) const {
@@ -106,15 +103,10 @@ class Tone {
   HWY_INLINE Tone(std::int32_t level, const std::array<std::int16_t, 2>& step)
       : base_(all(level >> kShift)), down_(all(step[1])) {
     constexpr int kHalf = 1 << (kShift - 1);
-    alignas(16) std::int16_t row[8];
-    for (int i = 0; i < 8; ++i) {
-      row[i] = static_cast<std::int16_t>((level & (2 * kHalf - 1)) + kHalf + step[0] * (i - 4));
-    }
-    row_ = hn::LoadDup128(D16(), row);
+    alignas(16) static constexpr std::int16_t kColumns[8] = {-4, -3, -2, -1, 0, 1, 2, 3};
+    row_ = hn::Add(all((level & (2 * kHalf - 1)) + kHalf), hn::Mul(hn::LoadDup128(D16(), kColumns), all(step[0])));
   }
-  HWY_INLINE V16 at(V16 dy) const {
-    return hn::Add(base_, hn::ShiftRight<kShift>(hn::Add(row_, hn::Mul(down_, dy))));
-  }
+  HWY_INLINE V16 at(V16 dy) const { return hn::Add(base_, hn::ShiftRight<kShift>(hn::Add(row_, hn::Mul(down_, dy)))); }
 
  private:
   V16 base_, down_, row_;
@@ -135,9 +127,8 @@ HWY_INLINE V16 greys(View2D<const u8> image, int x, int y, int row_step) {
 // Entries -1 where a coordinate's half rows are inside.
 HWY_INLINE V16 inside(V32 left, V32 right, std::int32_t first, std::int32_t last) {
   const V32 before = hn::Set(D32(), first), end = hn::Set(D32(), last);
-  const auto in = [&](V32 at) HWY_ATTR {
-    return hn::VecFromMask(D32(), hn::AndNot(hn::Lt(at, before), hn::Lt(at, end)));
-  };
+  const auto in = [&](V32 at)
+                      HWY_ATTR { return hn::VecFromMask(D32(), hn::AndNot(hn::Lt(at, before), hn::Lt(at, end))); };
   return hn::ReorderDemote2To(D16(), in(left), in(right));
 }
 
@@ -214,9 +205,8 @@ HWY_ATTR void add_block(View2D<const u8> image, const EdgePieces& edge, const No
   for (int dy = -4; dy < 4; dy += next) {
     const V32 u_left = along_columns.at(0, dy32), u_right = along_columns.at(1, dy32);
     const V32 v_left = along_rows.at(0, dy32), v_right = along_rows.at(1, dy32);
-    const auto node = [](V32 u, V32 v) HWY_ATTR {
-      return hn::Add(hn::ShiftRight<16>(u), hn::ShiftLeft<2>(hn::ShiftRight<16>(v)));
-    };
+    const auto node = [](V32 u, V32 v)
+                          HWY_ATTR { return hn::Add(hn::ShiftRight<16>(u), hn::ShiftLeft<2>(hn::ShiftRight<16>(v))); };
     const auto low_half = [](V32 left, V32 right) HWY_ATTR {
       const auto low = [](V32 x) HWY_ATTR { return hn::ShiftRight<16>(hn::ShiftLeft<16>(x)); };
       return hn::Xor(hn::ReorderDemote2To(D16(), low(left), low(right)), all(-32768));
@@ -292,9 +282,8 @@ HWY_ATTR void add_block(View2D<const u8> image, const EdgePieces& edge, const No
     dy32 = hn::Add(dy32, hn::Set(d32, next));
   }
 
-  const auto count = [&](PlaceSums::Row row, V16 counts) HWY_ATTR {
-    add_to(sums.lanes[row], add_products(hn::Zero(d32), counts, all(-1)));
-  };
+  const auto count = [&](PlaceSums::Row row, V16 counts)
+                         HWY_ATTR { add_to(sums.lanes[row], add_products(hn::Zero(d32), counts, all(-1))); };
   count(PlaceSums::kPixels, pixels);
   count(PlaceSums::kOnEdges, on_edges);
   count(PlaceSums::kSaturated, saturated);
@@ -303,15 +292,32 @@ HWY_ATTR void add_block(View2D<const u8> image, const EdgePieces& edge, const No
   add_to(sums.lanes[PlaceSums::kEvenSquares], even_squares);
   add_to(sums.lanes[PlaceSums::kPairProducts], pair_products);
   switch (stored.edge_vectors) {
-    case 0: break;
-    case 1: sum_edges<1>(stored, sums); break;
-    case 2: sum_edges<2>(stored, sums); break;
-    case 3: sum_edges<3>(stored, sums); break;
-    case 4: sum_edges<4>(stored, sums); break;
-    case 5: sum_edges<5>(stored, sums); break;
-    case 6: sum_edges<6>(stored, sums); break;
-    case 7: sum_edges<7>(stored, sums); break;
-    default: sum_edges<8>(stored, sums); break;
+    case 0:
+      break;
+    case 1:
+      sum_edges<1>(stored, sums);
+      break;
+    case 2:
+      sum_edges<2>(stored, sums);
+      break;
+    case 3:
+      sum_edges<3>(stored, sums);
+      break;
+    case 4:
+      sum_edges<4>(stored, sums);
+      break;
+    case 5:
+      sum_edges<5>(stored, sums);
+      break;
+    case 6:
+      sum_edges<6>(stored, sums);
+      break;
+    case 7:
+      sum_edges<7>(stored, sums);
+      break;
+    default:
+      sum_edges<8>(stored, sums);
+      break;
   }
   if (stored.even_vectors > 0) sum_even(stored, sums);
 }

@@ -204,12 +204,6 @@ void PlaceSums::add(const PixelCounts& c) {
   for (std::size_t k = 0; k < kRows - kPixels; ++k) lanes[kPixels + k][0] += values[k];
 }
 
-std::int32_t PlaceSums::total(std::size_t row) const {
-  std::int32_t sum = 0;
-  for (const std::int32_t lane : lanes[row]) sum += lane;
-  return sum;
-}
-
 ChannelSums PlaceSums::products() const {
   ChannelSums sums;
   for (std::size_t k = 0; k < kProducts; ++k) sums[k] = total(k);

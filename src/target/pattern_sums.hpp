@@ -79,7 +79,11 @@ struct PlaceSums {
 
   void clear();
   void add(const PixelCounts& counts);
-  std::int32_t total(std::size_t row) const;
+  std::int32_t total(std::size_t row) const {
+    std::int32_t sum = 0;
+    for (const std::int32_t lane : lanes[row]) sum += lane;
+    return sum;
+  }
   ChannelSums products() const;
   PixelCounts counts() const;
 };

@@ -23,9 +23,6 @@ constexpr double kLeastBlurChange = 0.1;
 constexpr double kMostDeviation_px = 1;
 // Smaller markers have no pixels to spare for the first passes, px.
 constexpr double kSmall_px = 48;
-// Rows that the passes take: of the levels alone, of the first step, which is long and need not be exact, of the
-// others.
-constexpr int kRowSteps[3] = {4, 4, 1};
 // Steps beyond are no refinement, px; nor are corners further from where they began than this, modules.
 constexpr double kMostStep_px = 3;
 constexpr double kMostChange_modules = 0.75;
@@ -195,8 +192,8 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
     // Levels alone from all pixels, and from mid-grey, so that no residual is beyond 128.
     state.dark[0] = 128;
     FitVector step;
-    if (!pass.run(scene, state, small ? 1 : kRowSteps[0]) || !pass.normal.solve_levels(step) ||
-        !move_levels(step, state)) {
+    if (!pass.run(scene, state, small ? FitPass::Share::all : FitPass::Share::quarter) ||
+        !pass.normal.solve_levels(step) || !move_levels(step, state)) {
       return false;
     }
   } else if (!(state.contrast[0] > kLeastContrast)) {
@@ -206,14 +203,15 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
   Tones tones = Tones::smooth;
   state.most_residual = kMostLimit;
   for (int k = 0; k < kMostPasses; ++k) {
-    const int row_step = k == 0 && !small ? kRowSteps[1] : kRowSteps[2];
+    // The first step is long and need not be exact.
+    const FitPass::Share share = k == 0 && !small ? FitPass::Share::quarter : FitPass::Share::all;
     pass = FitPass(tones);
-    if (!pass.run(scene, state, row_step)) return false;
+    if (!pass.run(scene, state, share)) return false;
     Step next(pass, scene.border, state);
     if (!next.take()) return false;
     if (farthest(state.corners, turned_round(corners)) * scene.border > kMostChange_modules * state.side_px)
       return false;
-    const bool last = next.is_last() && row_step == 1;
+    const bool last = next.is_last() && share == FitPass::Share::all;
     if (tones == Tones::smooth && (last || k >= kPatience) && pass.correlation() > kMostCorrelation) {
       tones = Tones::local;
       state.most_residual = kMostLimit;
