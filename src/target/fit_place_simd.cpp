@@ -29,7 +29,8 @@ Sums scaled(const PlaceSums& integers) {
   Sums sums;
   std::size_t k = 0;
   for (std::size_t c = 0; c < kChannels; ++c) {
-    for (std::size_t d = c; d < kChannels; ++d, ++k) sums[c][d] = sums[d][c] = integers.total(k) * (kUnit[c] * kUnit[d]);
+    for (std::size_t d = c; d < kChannels; ++d, ++k)
+      sums[c][d] = sums[d][c] = integers.total(k) * (kUnit[c] * kUnit[d]);
   }
   return sums;
 }
@@ -78,13 +79,13 @@ constexpr std::size_t kWidth = FitEquations::kWidth;
 using Row = FitEquations::Row;
 
 template <class Run>
-void add_part(double sum, const Run& run, Row& row) {
+HWY_INLINE void add_part(double sum, const Run& run, Row& row) {
   for (std::size_t k = 0; k < Run::count; ++k) row[Run::first + k] += sum * run.at[k];
 }
 
 // A channel's sums with every unknown from that run on which it is for, `levels` saying whether dark and contrast are
 // among the unknowns.
-Row sums_with(const std::array<double, kChannels>& sums, const Derivatives& by, bool levels) {
+HWY_INLINE Row sums_with(const std::array<double, kChannels>& sums, const Derivatives& by, bool levels) {
   Row row{};
   if (levels) {
     add_part(sums[kOne], by.dark, row);
@@ -102,7 +103,7 @@ Row sums_with(const std::array<double, kChannels>& sums, const Derivatives& by, 
 // Adds a channel to the rows of its unknowns, from column kFrom on: whole vectors, of which what is left of the
 // diagonal does not count.
 template <std::size_t kFrom, class Run>
-void add_channel(const Run& run, const Row& with, double residual, FitEquations& equations) {
+HWY_INLINE void add_channel(const Run& run, const Row& with, double residual, FitEquations& equations) {
   for (std::size_t k = 0; k < Run::count; ++k) {
     const double factor = run.at[k];
     Row& row = equations.rows[Run::first + k];

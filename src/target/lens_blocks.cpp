@@ -19,6 +19,13 @@ Quadratic through(const std::array<Point, 9>& grid, std::size_t axis) {
   return q;
 }
 
+std::array<float, 6> stored(const Quadratic& q) {
+  const auto f = [](double value) { return static_cast<float>(value); };
+  return {f(q.c), f(q.x), f(q.y), f(q.xx), f(q.xy), f(q.yy)};
+}
+
+Quadratic loaded(const std::array<float, 6>& q) { return {q[0], q[1], q[2], q[3], q[4], q[5]}; }
+
 }  // namespace
 
 LensBlocks::LensBlocks(const std::optional<CameraModel>& camera, int width, int height)
@@ -46,7 +53,7 @@ LensBlocks::LensBlocks(const std::optional<CameraModel>& camera, int width, int 
       for (int k = 0; k < 9; ++k) {
         grid[static_cast<std::size_t>(k)] = lines[static_cast<std::size_t>(k / 3 * points + 2 * column + k % 3)];
       }
-      blocks_.push_back({through(grid, 0), through(grid, 1)});
+      blocks_.push_back({stored(through(grid, 0)), stored(through(grid, 1))});
     }
   }
 }
@@ -59,8 +66,8 @@ void LensBlocks::rays(int column, int row, Quadratic& x, Quadratic& y) const {
   }
   const Block& block =
       blocks_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
-  x = block.x;
-  y = block.y;
+  x = loaded(block.x);
+  y = loaded(block.y);
 }
 
 std::array<double, 2> LensBlocks::ray(const Point& point_px) const {

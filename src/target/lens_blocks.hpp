@@ -31,8 +31,9 @@ class LensBlocks {
   std::array<double, 2> pixel(const std::array<double, 2>& ray, std::array<double, 4>& derivative) const;
 
  private:
+  // In floats, which are within 1e-4 px of the doubles: half the memory to fetch, and more is fetched than computed.
   struct Block {
-    Quadratic x, y;
+    std::array<float, 6> x, y;
   };
   std::optional<CameraModel> camera_;
   int columns_ = 0;
