@@ -160,7 +160,8 @@ HWY_AFTER_NAMESPACE();
 namespace berth {
 HWY_EXPORT(add_place);
 void FitNormal::add(const FitPlace& place, const PlaceSums& sums) {
-  if (sums.total(PlaceSums::kPixels) > 0) HWY_DYNAMIC_DISPATCH(add_place)(place, sums, tones_, equations_);
+  constexpr std::size_t kOneByOne = 0;  // pixels of this place, of which a block's quarter may have none
+  if (sums.total(kOneByOne) > 0) HWY_DYNAMIC_DISPATCH(add_place)(place, sums, tones_, equations_);
 }
 }  // namespace berth
 #endif
