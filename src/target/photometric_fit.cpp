@@ -23,6 +23,8 @@ constexpr double kLeastBlurChange = 0.1;
 constexpr double kMostDeviation_px = 1;
 // Smaller markers have no pixels to spare for the first passes, px.
 constexpr double kSmall_px = 48;
+// Nor are the modules' middles of smaller ones free of blur, px.
+constexpr double kSampled_px = 32;
 // Steps beyond are no refinement, px; nor are corners further from where they began than this, modules.
 constexpr double kMostStep_px = 3;
 constexpr double kMostChange_modules = 0.75;
@@ -188,7 +190,7 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
 
   const bool small = state.side_px < kSmall_px;
   FitPass pass(Tones::smooth);
-  if (!first_levels(scene, state)) {
+  if (state.side_px < kSampled_px || !first_levels(scene, state)) {
     // Levels alone from all pixels, and from mid-grey, so that no residual is beyond 128.
     state.dark[0] = 128;
     FitVector step;
