@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pose_algebra.hpp"
+#include "target/carry_pose.hpp"
 #include "target/marker_pose.hpp"
 #include "target/symmetric.hpp"
 
@@ -21,8 +22,6 @@ constexpr std::size_t kMostStarts = 8;
 constexpr int kRounds = 8;
 // Corners as far as this share of their reach before or behind a plane tell by themselves how it is tilted.
 constexpr double kFlat = 0.1;
-
-using Mat6 = SquareMatrix<6>;
 
 double squares_off(const CameraModel& camera, const Pose& pose, const PoseCorner& corner) {
   const Vec3 at = transform(pose, corner.point_m);
@@ -87,9 +86,12 @@ void BundlePoser::find(const CameraModel& camera, const std::vector<Detection>& 
   report(found, result);
   result.kept_out += spare;
   if (!has_other) return;
+  const RefinedPose other_at_origin = from_origin(other);
   result.uncertainty.has_other = true;
-  result.uncertainty.other = from_origin(other.pose);
+  result.uncertainty.other = other_at_origin.pose;
+  result.uncertainty.other_covariance = other_at_origin.covariance;
   result.uncertainty.other_error_px = other.error_px;
+  result.uncertainty.other_excess = other.chi_square - found.chi_square;
 }
 
 // Returns how many sightings there was no room for.
@@ -311,13 +313,16 @@ bool BundlePoser::other_of(const CameraModel& camera, const RefinedPose& found, 
   return true;
 }
 
-Pose BundlePoser::from_origin(const Pose& pose) const {
-  return {pose.R, add(pose.t, scaled(product(pose.R, centre_), -1))};
+RefinedPose BundlePoser::from_origin(const RefinedPose& pose) const {
+  return compose(pose, translation(-centre_[0], -centre_[1], -centre_[2]));
 }
 
 void BundlePoser::report(const RefinedPose& found, BundlePose& result) const {
+  const RefinedPose at_origin = from_origin(found);
   result.has_pose = true;
-  result.pose = from_origin(found.pose);
+  result.pose = at_origin.pose;
+  result.uncertainty.covariance = at_origin.covariance;
+  result.uncertainty.error_px = found.error_px;
   result.used = result.kept_out = result.corners_kept_out = 0;
   int corners = 0;
   for (std::size_t i = 0; i < in_.size(); i += 4) {
@@ -330,15 +335,6 @@ void BundlePoser::report(const RefinedPose& found, BundlePose& result) const {
       result.corners_kept_out += 4 - kept;
     }
   }
-  // A turn w about the centre moves the origin by w x (from centre to origin).
-  const Vec3 arm = product(found.pose.R, centre_);
-  Mat6 by{};
-  for (std::size_t i = 0; i < 6; ++i) by[7 * i] = 1;
-  by[0 * 6 + 4] = -arm[2], by[0 * 6 + 5] = arm[1];
-  by[1 * 6 + 3] = arm[2], by[1 * 6 + 5] = -arm[0];
-  by[2 * 6 + 3] = -arm[1], by[2 * 6 + 4] = arm[0];
-  result.uncertainty.covariance = multiply<6>(multiply<6>(by, found.covariance), transposed<6>(by));
-  result.uncertainty.error_px = found.error_px;
   // Two markers or more tell when the covariances are too small for what the bundle is.
   const double spread = result.used > 1 ? found.chi_square / (2 * corners - 6) : 1;
   for (double& value : result.uncertainty.covariance) value *= std::max(1.0, spread);

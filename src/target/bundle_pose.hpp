@@ -50,7 +50,7 @@ class BundlePoser {
   bool mirrored(const Pose& pose, Pose& start) const;
   bool other_of(const CameraModel& camera, const RefinedPose& found, RefinedPose& other);
   void report(const RefinedPose& found, BundlePose& result) const;
-  Pose from_origin(const Pose& pose) const;
+  RefinedPose from_origin(const RefinedPose& pose) const;
 
   Bundle bundle_;
   std::vector<Sighting> sightings_;
