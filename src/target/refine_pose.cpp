@@ -10,15 +10,6 @@ namespace {
 // In squares of standard deviations.
 constexpr double kSame = 0.01;
 
-// Derivatives by translation, then rotation about the camera's axes.
-bool add_corner(const CameraModel& camera, const Pose& pose, const PoseCorner& corner, PoseNormal& normal) {
-  const Vec3 arm = product(pose.R, corner.point_m);
-  return add_seen(camera, add(arm, pose.t), corner, normal, [&](const Vec3& by_point) -> std::array<double, 6> {
-    const Vec3 by_turn = cross(arm, by_point);  // by_point · (w × arm)
-    return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
-  });
-}
-
 // The distance from what was expected.
 void add_prior(const Pose& pose, const PosePrior& prior, PoseNormal& normal) {
   const std::array<double, 6> off = step_between(prior.pose, pose);
