@@ -8,9 +8,7 @@
 
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
-#include <new>
 #include <vector>
 
 #include "berth/detector.hpp"
@@ -18,23 +16,11 @@
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
 #include "sim/render.hpp"
+#include "support/counted_allocations.hpp"
+#include "support/noisy_corners.hpp"
 #include "target/bundle_pose.hpp"
 #include "target/marker_pose.hpp"
 #include "target/symmetric.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-// Counted: the frame path must not allocate. Not inlined: seeing free() beside operator new, GCC takes them for a
-// mismatch.
-[[gnu::noinline]] void* operator new(std::size_t bytes) {
-  ++allocations;
-  if (void* memory = std::malloc(bytes)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace berth {
 namespace {
@@ -61,13 +47,6 @@ Bundle corner_of_a_box() {
   bundle.markers = {{tags, 0, 0.08, {sim::rotation_y(radians(45)), {5.04, 2, -0.3}}},
                     {tags, 1, 0.08, {sim::rotation_y(radians(-45)), {4.96, 2, -0.3}}}};
   return bundle;
-}
-
-/// Near enough normal: the sum of twelve uniform numbers.
-double normal(sim::Random& random) {
-  double sum = -6;
-  for (int k = 0; k < 12; ++k) sum += random.uniform(0, 1);
-  return sum;
 }
 
 /// A frame of the bundle's markers at a pose, each corner off by noise, each marker with its own pose. Markers that are

@@ -7,30 +7,15 @@
 #include <hwy/targets.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <new>
 
 #include "berth/detector.hpp"
 #include "sim/close_up.hpp"
 #include "sim/render.hpp"
+#include "support/counted_allocations.hpp"
 #include "target/edge_profile.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-// Counted: the frame path must not allocate. Not inlined: seeing free() beside operator new, GCC takes them for a
-// mismatch.
-[[gnu::noinline]] void* operator new(std::size_t bytes) {
-  ++allocations;
-  if (void* memory = std::malloc(bytes)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace berth {
 namespace {

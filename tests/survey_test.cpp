@@ -71,7 +71,7 @@ std::optional<Detection> seen(const CameraModel& camera, const Pose& body, const
     const auto& [x, y] = detection.corners[k];
     if (x < 1 || y < 1 || x > camera.width - 2 || y > camera.height - 2) return std::nullopt;
   }
-  // With covariances of their own the corners count as not from lines, whose bend the survey would take off.
+  // With covariances of their own the corners count as not from lines, whose bound is wider.
   const double variance = noise_px * noise_px;
   detection.corner_fit.emplace();
   detection.corner_fit->covariance_px2.fill({variance, 0, variance});

@@ -29,8 +29,7 @@ CalibrationDeviation deviation() {
 Detection marker_at(const Corners4& corners) {
   Detection marker;
   marker.corners = corners;
-  marker.has_pose =
-      marker_pose(paper_camera(), kSide_m, 0.1, corners, marker.pose, marker.pose_uncertainty.emplace());
+  marker.has_pose = marker_pose(paper_camera(), kSide_m, 0.1, corners, marker.pose, marker.pose_uncertainty.emplace());
   return marker;
 }
 

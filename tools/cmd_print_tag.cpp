@@ -78,8 +78,10 @@ int print_tag(const PrintCommand& command, Console& console) {
   if (command.bundle.empty() && (command.family.empty() || !(command.size_m > 0))) {
     throw Error("print-tag needs FAMILY, ID and --size, or --bundle FILE; see berth print-tag --help");
   }
-  if (!command.bundle.empty() && (!command.family.empty() || command.size_m > 0)) {
-    throw Error("--bundle says itself which markers and how large; leave FAMILY, ID and --size out");
+  if (!command.bundle.empty() &&
+      (!command.family.empty() || command.size_m > 0 || command.grid != "1x1" || command.gap_m > 0)) {
+    throw Error(
+        "--bundle says itself which markers, where and how large; leave FAMILY, ID, --size, --grid and --gap out");
   }
   const TagSheet sheet = sheet_of(command);
   if (!command.bundle.empty()) {

@@ -8,7 +8,12 @@
 #if BERTH_WITH_SURVEY
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "camera/bad_input.hpp"
 #include "camera/sources.hpp"

@@ -26,7 +26,8 @@ constexpr const char* kExamples = R"(Examples:
   berth survey --camera cam.yaml --marker-size 0.05 --out bundle.yaml images/
   berth doctor                                   what this machine has, and what it lacks
 
-Exit codes: 0 all well; 1 verify or eval found a difference, or a flight did not dock; 2 bad input or usage.)";
+Exit codes: 0 all well; 1 verify or eval found a difference, a flight did not dock, or
+calibrate or survey refused the views; 2 bad input or usage.)";
 
 /// "a, b or c": the commands below one; empty where there are none.
 std::string choices_of(const CLI::App& command) {

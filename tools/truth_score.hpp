@@ -38,8 +38,6 @@ class TruthScore {
   const std::map<std::pair<std::string, int>, MarkerScore>& markers() const { return markers_; }
   /// Detections of markers that the frame did not show.
   int false_positives() const { return false_positives_; }
-  /// By name.
-  const std::map<std::string, BundleScore>& bundles() const { return bundles_; }
   /// The table: a row a marker, then a row a bundle; medians and maxima.
   void print(std::ostream& out) const;
 

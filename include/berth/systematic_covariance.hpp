@@ -17,9 +17,9 @@ struct CalibrationDeviation {
   double marker_size_m = 0;
 };
 
-/// What errors of calibration and of the marker's size make of a marker's pose: a covariance as PoseUncertainty's, of an
-/// error that is the same in every frame that shows the marker at the same place. It adds to a frame's covariance, and
-/// no filter averages it away. Returns false, and leaves `covariance` alone, where the marker has no pose.
+/// What errors of calibration and of the marker's size make of a marker's pose: a covariance as PoseUncertainty's, of
+/// an error that is the same in every frame that shows the marker at the same place. It adds to a frame's covariance,
+/// and no filter averages it away. Returns false, and leaves `covariance` alone, where the marker has no pose.
 bool systematic_covariance(const CameraModel& camera, double marker_size_m, const Detection& marker,
                            const CalibrationDeviation& deviation, std::array<double, 36>& covariance);
 

@@ -17,10 +17,11 @@ constexpr double kLeastGroups = 5, kByChance = 1.3;
 // (the jackknife, by groups), all coordinates together. 1 where it might be by chance, or too few groups can be spared.
 double correlation_factor(const SurveyNet& net, bool free_sizes, const Survey& result) {
   std::vector<std::vector<std::array<double, 6>>> moves;  // of each group, of each marker
-  for (std::size_t g = 0; g < kGroups; ++g) {
+  const std::size_t parts = std::min(kGroups, net.stations.size());
+  for (std::size_t g = 0; g < parts; ++g) {
     SurveyNet part = net;
     const auto at = [&](std::size_t k) {
-      return part.stations.begin() + static_cast<std::ptrdiff_t>(k * net.stations.size() / kGroups);
+      return part.stations.begin() + static_cast<std::ptrdiff_t>(k * net.stations.size() / parts);
     };
     part.stations.erase(at(g), at(g + 1));
     const std::vector<bool> apart = unconnected(part);

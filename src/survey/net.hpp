@@ -21,7 +21,7 @@ struct Sight {
   /// Where the corners were found, paper's order, px.
   std::array<Vec2, 4> seen_px = {};
   CornerCovariances covariances_px2 = {};
-  /// The corners are where straight lines along the sides meet.
+  /// The corners come of lines along the sides, not of a fit of the pattern.
   bool by_lines = false;
   /// Corners that take part.
   std::array<bool, 4> kept = {true, true, true, true};

@@ -5,8 +5,7 @@
 namespace berth {
 
 /// From a start to the adjusted net: robustly at first, then by least squares without the corners that do not fit,
-/// until those stay the same. What the lens makes of straight sides is taken off on the way. Returns false where there
-/// is no solution.
+/// until those stay the same. Returns false where there is no solution.
 bool settle(SurveyNet& net, bool free_sizes);
 
 }  // namespace berth

@@ -244,9 +244,7 @@ void start_net(SurveyNet& net, bool free_sizes) {
   if (free_sizes) views = views_of(net);
   for (std::size_t s = 0; s < net.stations.size(); ++s) {
     SurveyStation& station = net.stations[s];
-    // The views point into the station's sights, so those are dropped by their flags alone.
-    if (place_camera(net, views[s], station)) continue;
-    for (Sight& sight : station.sights) sight.kept = {};
+    if (!place_camera(net, views[s], station)) station.sights.clear();  // its view is not looked at again
   }
 }
 

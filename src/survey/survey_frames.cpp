@@ -20,7 +20,8 @@ bool repeats(const SurveyFrame& frame, const SurveyFrame& earlier, double moved_
     if (before == earlier.markers.end()) return false;
     for (std::size_t k = 0; k < 4; ++k) {
       const auto &a = marker.corners[k], &b = before->corners[k];
-      if (std::hypot(a[0] - b[0], a[1] - b[1]) > moved_px) return false;
+      const double dx = a[0] - b[0], dy = a[1] - b[1];
+      if (dx * dx + dy * dy > moved_px * moved_px) return false;
     }
     return true;
   });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pose_algebra.hpp"
 #include "target/carry_pose.hpp"
@@ -80,7 +81,11 @@ void BundlePoser::find(const CameraModel& camera, const std::vector<Detection>& 
   bool has_other = other_of(camera, found, other);
   if (has_other && other.chi_square < found.chi_square) {
     // The start was the wrong one of two: what fits is judged again from the right one.
-    if (solve(camera, other.pose, from, found)) has_other = other_of(camera, found, other);
+    if (!solve(camera, other.pose, from, found) && !solve(camera, start, from, found)) {
+      result.kept_out = spare + static_cast<int>(sightings_.size());
+      return;
+    }
+    has_other = other_of(camera, found, other);
     if (has_other && other.chi_square < found.chi_square) std::swap(found, other);
   }
   report(found, result);

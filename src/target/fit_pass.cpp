@@ -16,6 +16,7 @@ constexpr int kLeastPairs = 100;
 // A place, in which the field's factors are taken as constant, is a quarter of a block in smaller markers than this,
 // and four blocks in markers from that size on.
 constexpr double kQuarters_px = 32, kFours_px = 88;
+constexpr int kHalfSide = LensBlocks::kSide / 2;
 
 // One block of a place.
 struct Part {
@@ -67,8 +68,8 @@ FitPlace place_of(const Parts& parts, const BlockModels& models, const AxesBlur&
   double x = dx, y = dy;
   const double share = 1 / static_cast<double>(parts.end() - parts.begin());
   for (const Part& part : parts) {
-    x += share * (LensBlocks::kSide * part.column + LensBlocks::kSide / 2);
-    y += share * (LensBlocks::kSide * part.row + LensBlocks::kSide / 2);
+    x += share * (LensBlocks::kSide * part.column + kHalfSide);
+    y += share * (LensBlocks::kSide * part.row + kHalfSide);
   }
   place.x = models.x_of(x);
   place.y = models.y_of(y);

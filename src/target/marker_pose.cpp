@@ -7,7 +7,7 @@
 #include "target/refine_pose.hpp"
 
 namespace berth {
-bool faces_camera(const Pose& pose) { return dot(column(pose.R, 2), pose.t) > 0; }
+bool faces_camera(const Pose& marker) { return dot(column(marker.R, 2), marker.t) > 0; }
 
 CornerCovariances corner_covariances(const Detection& marker, double deviation_px) {
   if (marker.corner_fit) return marker.corner_fit->covariance_px2;

@@ -204,12 +204,6 @@ void PlaceSums::add(const PixelCounts& c) {
   for (std::size_t k = 0; k < kRows - kPixels; ++k) lanes[kPixels + k][0] += values[k];
 }
 
-ChannelSums PlaceSums::products() const {
-  ChannelSums sums;
-  for (std::size_t k = 0; k < kProducts; ++k) sums[k] = total(k);
-  return sums;
-}
-
 PixelCounts PlaceSums::counts() const {
   return {total(kPixels), total(kOnEdges),     total(kSaturated),   total(kEven),
           total(kPairs),  total(kEvenSquares), total(kPairProducts)};

@@ -47,10 +47,6 @@ enum Channel : int {
 /// Products of two channels, row by row of the upper triangle.
 constexpr int kProducts = kChannels * (kChannels + 1) / 2;
 
-/// Sums over a place: a quarter of a block, a block, or four. Every entry is below 2^31 in size: 256 · 2355² are,
-/// levels being below 1.15 with the tone curve's part, everything else below 2^11.
-using ChannelSums = std::array<std::int32_t, kProducts>;
-
 /// Pixels told apart.
 struct PixelCounts {
   /// Those that count; those among them that see an edge; those left out for being 0 or 255.
@@ -61,8 +57,9 @@ struct PixelCounts {
   std::int32_t even_squares = 0, pair_products = 0;
 };
 
-/// Sums of a place as they grow, a row each: products, then what PixelCounts holds, in its order. Totals over the lanes
-/// count, not which pixels a lane took.
+/// Sums of a place (a quarter of a block, a block, or four) as they grow, a row each: products, then what PixelCounts
+/// holds, in its order. Totals over the lanes count, not which pixels a lane took. Every total is below 2^31 in size:
+/// 256 · 2355² are, levels being below 1.15 with the tone curve's part, everything else below 2^11.
 struct PlaceSums {
   static constexpr std::size_t kLanes = 8;
   enum Row : std::size_t {
@@ -84,7 +81,6 @@ struct PlaceSums {
     for (const std::int32_t lane : lanes[row]) sum += lane;
     return sum;
   }
-  ChannelSums products() const;
   PixelCounts counts() const;
 };
 

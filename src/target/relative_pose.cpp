@@ -1,4 +1,5 @@
 #include <cmath>
+#include <utility>
 
 #include "berth/stations.hpp"
 #include "target/carry_pose.hpp"
