@@ -296,9 +296,9 @@ TEST(BundlePose, HasTheBitsItHad) {
     const Pose truth = random_pose(random, {}, 0.3, 1);
     std::vector<Detection> detections = seen(camera, i % 2 == 0 ? bundle : moved, truth, kDeviation_px, random);
     add_own_poses(camera, bundle, detections);
-    const std::size_t before = allocations;
+    const std::size_t before = test::allocations();
     poser.find(camera, detections, kDeviation_px, pose);
-    EXPECT_EQ(allocations, before) << "find allocates";
+    EXPECT_EQ(test::allocations(), before) << "find allocates";
     EXPECT_EQ(pose.kept_out, i % 2);
     for (const double value : pose.pose.R) mix(value);
     for (const double value : pose.pose.t) mix(value);

@@ -215,9 +215,9 @@ TEST(PhotometricFit, HasTheBitsItHad) {
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
     Corners corners = truth.corners;
     CornerFit fit;
-    const std::size_t before = allocations;
+    const std::size_t before = test::allocations();
     EXPECT_TRUE(photometric.refine(image.view(), family("tag36h11"), truth.id, corners, fit));
-    EXPECT_EQ(allocations, before) << "refine allocates";
+    EXPECT_EQ(test::allocations(), before) << "refine allocates";
     const u64 digest = digest_of(corners);
     EXPECT_EQ(digest, 0xbd9bb478a5b88659u) << std::hex << "0x" << digest << " on " << hwy::TargetName(target);
   }
