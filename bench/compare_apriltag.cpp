@@ -5,14 +5,15 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <ctime>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "berth/error.hpp"
+#include "clock.hpp"
 #include "engines.hpp"
+#include "run_main.hpp"
 #include "score.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
@@ -70,12 +71,6 @@ std::vector<Frame> read_pictures(const Options& options) {
   }
   if (frames.empty()) throw Error(options.images + ": no .jpg, .png or .pgm in this folder");
   return frames;
-}
-
-double ms_on(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
 }
 
 double quantile(std::vector<double> values, double share) {
@@ -182,11 +177,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace berth::bench
 
-int main(int argc, char** argv) {
-  try {
-    return berth::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "compare_apriltag: {}\n", error.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return berth::bench::run_main("compare_apriltag", berth::bench::run, argc, argv); }

@@ -5,14 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
+#include "clock.hpp"
 #include "corner_bound.hpp"
 #include "engines.hpp"
 #include "exact_math.hpp"
+#include "run_main.hpp"
 #include "score.hpp"
 #include "sim/close_up.hpp"
 #include "sim/corpus.hpp"
@@ -86,12 +87,6 @@ std::vector<Case> cases() {
   return all;
 }
 
-double ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
-
 struct Row {
   Score edges, fit, apriltag, opencv;
   double bound_squares = 0, fit_ms = 0;
@@ -112,9 +107,9 @@ class Bench {
       edges.push_back({d.id, d.corners});
       Corners corners = d.corners;
       CornerFit how;
-      const double start = ms();
+      const double start = ms_on(CLOCK_THREAD_CPUTIME_ID);
       row.fitted += fit.refine(image.view(), *d.family, d.id, corners, how) ? 1 : 0;
-      row.fit_ms += ms() - start;
+      row.fit_ms += ms_on(CLOCK_THREAD_CPUTIME_ID) - start;
       ++row.markers;
       photometric.push_back({d.id, corners});
     }
@@ -186,11 +181,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace berth::bench
 
-int main(int argc, char** argv) {
-  try {
-    return berth::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "compare_corners: {}\n", error.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return berth::bench::run_main("compare_corners", berth::bench::run, argc, argv); }

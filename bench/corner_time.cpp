@@ -6,12 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <ctime>
 #include <memory>
 #include <vector>
 
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
+#include "clock.hpp"
+#include "run_main.hpp"
 #include "sim/close_up.hpp"
 #include "sim/render.hpp"
 #include "target/photometric_fit.hpp"
@@ -19,11 +20,8 @@
 namespace berth::bench {
 namespace {
 
-double us() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
+// Processor time, µs.
+double us() { return 1e3 * ms_on(CLOCK_THREAD_CPUTIME_ID); }
 
 // One frame of one marker, and the least that each way took on it.
 class Frame {
@@ -112,11 +110,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace berth::bench
 
-int main(int argc, char** argv) {
-  try {
-    return berth::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "corner_time: {}\n", error.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return berth::bench::run_main("corner_time", berth::bench::run, argc, argv); }

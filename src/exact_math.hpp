@@ -9,6 +9,8 @@ namespace berth {
 // that is not the point. The point is that they never change.
 
 constexpr double kPi = 3.14159265358979323846;
+/// In a radian; for people to read.
+constexpr double kDegrees = 57.295779513082323;
 
 /// Largest integer not above x, |x| < 2^62.
 inline long long floor_int(double x) {

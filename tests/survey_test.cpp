@@ -24,8 +24,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr double kDegrees = 57.295779513082323;
-
 CameraModel fisheye_camera() {
   CameraModel camera = paper_camera();
   camera.fx = 402;

@@ -48,14 +48,6 @@ struct CalibrateCommand {
   EngineOptions engine;
 };
 
-double metres(const char* option, const std::string& text) {
-  try {
-    return parse_size(text);
-  } catch (const Error&) {
-    throw bad_field("command line", option, "'" + text + "'", "give metres, above 0 and at most 1000, e.g. 0.03");
-  }
-}
-
 Board board_of(const CalibrateCommand& command) {
   Board board;
   board.kind = command.kind;
@@ -65,7 +57,7 @@ Board board_of(const CalibrateCommand& command) {
     throw bad_field("command line", "--grid", "'" + command.grid + "'",
                     "give columns x rows of squares, or of an aprilgrid's markers, e.g. 9x7");
   }
-  const double size_m = metres("--size", command.size);
+  const double size_m = parse_metres("--size", command.size);
   const bool charuco = board.kind == BoardKind::charuco, aprilgrid = board.kind == BoardKind::aprilgrid;
   const auto only_for = [](const char* option, bool given, const char* kind) {
     if (given) throw bad_field("command line", option, "given", std::string("leave it out: only ") + kind + " has it");
@@ -81,12 +73,12 @@ Board board_of(const CalibrateCommand& command) {
     if (command.marker.empty()) {
       throw bad_field("command line", "--marker", "missing", "give the side of a marker's border square, metres");
     }
-    board.marker_m = metres("--marker", command.marker);
+    board.marker_m = parse_metres("--marker", command.marker);
   }
   if (aprilgrid) {
     board.marker_m = size_m;
     board.pitch_m =
-        command.gap.empty() ? default_pitch_m(*board.family, size_m) : size_m + metres("--gap", command.gap);
+        command.gap.empty() ? default_pitch_m(*board.family, size_m) : size_m + parse_metres("--gap", command.gap);
   }
   board.check();
   return board;
@@ -102,14 +94,8 @@ class Gathering {
   const ViewSet& run(Source& source) {
     LiveView live(console_.out(), console_.out_is_terminal(), source.size());
     const InterruptWatch interrupt;
-    while (!interrupt.came() && !full_) {
-      std::optional<SourceFrame> frame;
-      try {
-        frame = source.next();
-      } catch (const Error& error) {
-        console_.complain(error.what());
-        continue;
-      }
+    while (!full_) {
+      const std::optional<SourceFrame> frame = next_readable(source, console_, interrupt);
       if (!frame) break;
       ++frames_;
       const char* verdict = look_at(*frame);

@@ -49,17 +49,9 @@ struct SurveyCommand {
 
 #if BERTH_WITH_SURVEY
 
-double metres(const char* option, const std::string& text) {
-  try {
-    return parse_size(text);
-  } catch (const Error&) {
-    throw bad_field("command line", option, "'" + text + "'", "give metres, above 0 and at most 1000, e.g. 0.05");
-  }
-}
-
 SurveyOptions options_of(const SurveyCommand& command) {
   SurveyOptions options;
-  options.size_m = metres("--marker-size", command.size);
+  options.size_m = parse_metres("--marker-size", command.size);
   for (const std::string& text : command.sizes) {
     const std::size_t equals = text.find('=');
     int id = -1;
@@ -68,7 +60,7 @@ SurveyOptions options_of(const SurveyCommand& command) {
     if (equals == std::string::npos || parsed.ec != std::errc() || parsed.ptr != end || id < 0) {
       throw bad_field("command line", "--size", "'" + text + "'", "give a marker's id and its side, e.g. 4=0.04");
     }
-    options.sizes_m[id] = metres("--size", text.substr(equals + 1));
+    options.sizes_m[id] = parse_metres("--size", text.substr(equals + 1));
   }
   if (command.origin >= 0) options.origin = command.origin;
   options.free_sizes = command.free_sizes;
@@ -103,15 +95,7 @@ class Gathering {
     LiveView live(console_.out(), console_.out_is_terminal(), source.size());
     const InterruptWatch interrupt;
     std::size_t count = 0;
-    while (!interrupt.came()) {
-      std::optional<SourceFrame> frame;
-      try {
-        frame = source.next();
-      } catch (const Error& error) {
-        console_.complain(error.what());
-        continue;
-      }
-      if (!frame) break;
+    while (const std::optional<SourceFrame> frame = next_readable(source, console_, interrupt)) {
       ++count;
       const char* verdict = look_at(*frame);
       live.show(count, fmt::format("{} frames taken, {} markers", frames_->frames().size(), seen_.size()), table(),

@@ -164,25 +164,22 @@ EngineBackends open_chosen_backends(const EngineOptions& options) {
   return opened;
 }
 
-double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id) {
-  for (const Bundle& bundle : config.bundles) {
-    if (const BundleMarker* marker = bundle.find(family, id)) return marker->size_m;
+double parse_metres(const char* option, const std::string& text, const std::string& remedy) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double metres = 0;
+  stream >> metres;
+  // The upper bound catches a size in millimetres before it becomes a pose a thousand times too far away.
+  if (stream.fail() || !stream.eof() || !std::isfinite(metres) || !(metres > 0) || metres > 1000) {
+    throw bad_field(kCommandLine, option, "'" + text + "'", remedy);
   }
-  return config.marker_size_m;
+  return metres;
 }
 
 double parse_size(const std::string& text) {
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  double size_m = 0;
-  stream >> size_m;
-  // The upper bound catches a size in millimetres before it becomes a pose a thousand times too far away.
-  if (stream.fail() || !stream.eof() || !std::isfinite(size_m) || !(size_m > 0) || size_m > 1000) {
-    throw bad_field(
-        kCommandLine, "--size", "'" + text + "'",
-        "give the side of the marker's border square in metres, above 0 and at most 1000, e.g. --size 0.08");
-  }
-  return size_m;
+  return parse_metres(
+      "--size", text,
+      "give the side of the marker's border square in metres, above 0 and at most 1000, e.g. --size 0.08");
 }
 
 CornerMethod corner_method(const EngineOptions& options) {

@@ -60,9 +60,9 @@ EngineBackends open_chosen_backends(const EngineOptions& options);
 /// names the field, its value and the remedy.
 DetectorConfig make_config(const EngineOptions& options);
 
-/// The side that a marker's pose goes by: its bundle's, else the configuration's.
-double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id);
-
+/// Metres as typed after `option`. Throws Error with that remedy unless it is a finite number above 0 and at most 1000.
+double parse_metres(const char* option, const std::string& text,
+                    const std::string& remedy = "give metres, above 0 and at most 1000, e.g. 0.05");
 /// A marker side in metres as typed. Throws Error unless it is a finite number above 0 and at most 1000.
 double parse_size(const std::string& text);
 

@@ -25,4 +25,15 @@ std::unique_ptr<Source> open_arguments(const std::vector<std::string>& images, c
   return open_images(paths);
 }
 
+std::optional<SourceFrame> next_readable(Source& source, Console& console, const InterruptWatch& interrupt) {
+  while (!interrupt.came()) {
+    try {
+      return source.next();
+    } catch (const Error& error) {
+      console.complain(error.what());
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace berth::cli

@@ -17,6 +17,7 @@
 #include "live_view.hpp"
 #include "marker_filters.hpp"
 #include "output_file.hpp"
+#include "source_arguments.hpp"
 #include "trajectory_svg.hpp"
 #include "truth_score.hpp"
 
@@ -41,14 +42,8 @@ class StreamRun {
 
   StreamSum run() {
     const InterruptWatch interrupt;
-    while (!interrupt.came() && (options_.max_frames == 0 || frames_ < options_.max_frames)) {
-      std::optional<SourceFrame> frame;
-      try {
-        frame = source_.next();
-      } catch (const Error& error) {
-        console_.complain(error.what());
-        continue;
-      }
+    while (options_.max_frames == 0 || frames_ < options_.max_frames) {
+      const std::optional<SourceFrame> frame = next_readable(source_, console_, interrupt);
       if (!frame) break;
       handle(*frame);
     }

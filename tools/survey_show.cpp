@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
-#include "degrees.hpp"
+#include "exact_math.hpp"
 #include "pose_algebra.hpp"
 #include "svg_panel.hpp"
 
@@ -22,8 +22,6 @@ Vec3 turn_deg(const Pose& pose) {
 
 /// With two digits; nothing is -0.00.
 std::string rounded(double value) { return fmt::format("{:.2f}", std::round(100 * value) / 100 + 0.0); }
-
-std::string label_of(const BundleMarker& marker) { return fmt::format("{} {}", marker.family->name, marker.id); }
 
 /// Of the two axes.
 SvgPoints corners_of(const BundleMarker& marker, std::size_t across, std::size_t up) {
@@ -77,7 +75,7 @@ std::string survey_text(const Survey& survey) {
     const bool origin = m == survey.origin;
     text +=
         fmt::format("  {:<16} {:>8} {:>9} {:>9} {:>9} {:>7}  {:>8} {:>8} {:>8} {:>7} {:>7} {:>7.3f} {:>9}\n",
-                    label_of(marker), rounded(1000 * marker.size_m), rounded(at[0]), rounded(at[1]), rounded(at[2]),
+                    name_of(marker), rounded(1000 * marker.size_m), rounded(at[0]), rounded(at[1]), rounded(at[2]),
                     origin ? "origin" : fmt::format("{:.3f}", 1000 * known.position_deviation_m()), rounded(turn[0]),
                     rounded(turn[1]), rounded(turn[2]), origin ? "" : fmt::format("{:.3f}", known.turn_deviation_deg()),
                     known.frames, known.rms_px, fmt::format("{}/{}", known.rejected, known.corners));
@@ -126,7 +124,7 @@ std::string layout_svg(const Survey& survey) {
   front.flip_up();
   SvgPanel above(592, 80, 420, "From above", "x, m", "z, m");
   const std::string title = fmt::format("{}: {} markers, in the frame of {}", survey.bundle.name,
-                                        survey.bundle.markers.size(), label_of(survey.bundle.markers[survey.origin]));
+                                        survey.bundle.markers.size(), name_of(survey.bundle.markers[survey.origin]));
   return svg_head(1060, 560, title) + panel_svg(survey, front, 0, 1) + panel_svg(survey, above, 0, 2) + "</svg>\n";
 }
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "degrees.hpp"
+#include "exact_math.hpp"
 #include "pose_algebra.hpp"
 
 namespace berth::cli {

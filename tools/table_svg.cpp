@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "degrees.hpp"
+#include "exact_math.hpp"
 #include "svg_panel.hpp"
 #include "trajectory_svg.hpp"
 

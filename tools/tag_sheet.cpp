@@ -146,8 +146,6 @@ bool overlap(const PrintPage::Rectangle& a, const PrintPage::Rectangle& b) {
          b.y + b.height > a.y + kTouch_mm;
 }
 
-std::string name_of(const BundleMarker& marker) { return fmt::format("{} {}", marker.family->name, marker.id); }
-
 std::vector<Placed> places_on_paper(const Bundle& bundle) {
   const Pose paper = inverse(bundle.markers.at(0).pose);
   std::vector<Placed> all;

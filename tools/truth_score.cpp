@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "degrees.hpp"
+#include "exact_math.hpp"
 
 namespace berth::cli {
 namespace {

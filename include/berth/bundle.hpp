@@ -20,6 +20,9 @@ struct BundleMarker {
   Pose pose;
 };
 
+/// "tag36h11 7"
+std::string name_of(const BundleMarker& marker);
+
 /// Markers that do not move against each other: on a board, nested in each other, or around a dock. One pose for all.
 struct Bundle {
   std::string name;

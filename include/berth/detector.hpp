@@ -67,6 +67,9 @@ struct DetectorConfig {
   bool digests = false;
 };
 
+/// The side that a marker's pose goes by, m: its bundle's, else the configuration's.
+double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id);
+
 /// Finds markers in frames of one size on one backend. All memory is taken in the constructor.
 class Detector {
  public:

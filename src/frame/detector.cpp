@@ -58,7 +58,7 @@ std::vector<BundlePoser> bundle_posers(const std::vector<Bundle>& bundles,
   for (const Bundle& bundle : bundles) {
     bundle.check();
     for (const BundleMarker& marker : bundle.markers) {
-      const std::string which = marker.family->name + " " + std::to_string(marker.id);
+      const std::string which = name_of(marker);
       if (std::find(families.begin(), families.end(), marker.family) == families.end()) {
         throw Error("bundle \"" + bundle.name + "\" has " + which + ", whose family is not looked for; add " +
                     marker.family->name + " to the families");
@@ -273,16 +273,9 @@ struct Detector::Impl {
     }
   }
 
-  double size_of(const Detection& d) const {
-    for (const BundlePoser& poser : bundles) {
-      if (const BundleMarker* marker = poser.bundle().find(*d.family, d.id)) return marker->size_m;
-    }
-    return config.marker_size_m;
-  }
-
   void add_pose(Detection& d) const {
     const CameraModel& camera = *config.camera;
-    const double size_m = size_of(d);
+    const double size_m = marker_size_m(config, *d.family, d.id);
     d.pose_uncertainty.reset();
     d.has_pose = false;
     if (!(size_m > 0)) return;
@@ -329,6 +322,13 @@ struct Detector::Impl {
   FrameResult result;
   Clock::time_point started;
 };
+
+double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id) {
+  for (const Bundle& bundle : config.bundles) {
+    if (const BundleMarker* marker = bundle.find(family, id)) return marker->size_m;
+  }
+  return config.marker_size_m;
+}
 
 Detector::Detector(Backend& backend, int width, int height, const DetectorConfig& config)
     : impl_(std::make_unique<Impl>(backend, width, height, config)) {}

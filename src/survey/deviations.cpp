@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "exact_math.hpp"
 #include "survey/adjust.hpp"
 
 namespace berth {
 namespace {
 
-constexpr double kDegrees = 57.295779513082323;
 constexpr std::size_t kGroups = 10;
 constexpr double kLeastGroups = 5, kByChance = 1.3;
 

@@ -8,8 +8,6 @@ bool SurveyStation::is_used() const {
   return std::count_if(sights.begin(), sights.end(), [](const Sight& sight) { return sight.is_kept(); }) >= 2;
 }
 
-std::string name_of(const BundleMarker& marker) { return marker.family->name + " " + std::to_string(marker.id); }
-
 std::string names_of(const SurveyNet& net, const std::vector<bool>& chosen) {
   std::string names;
   for (std::size_t m = 0; m < net.markers.size(); ++m) {
@@ -26,12 +24,6 @@ bool residual(const SurveyNet& net, const SurveyStation& station, const Sight& s
   const Vec2 image = image_of(net.camera, at), seen = sight.seen_px[corner];
   off_px = {seen[0] - image[0], seen[1] - image[1]};
   return finite(off_px[0]) && finite(off_px[1]);
-}
-
-double whitened_square(const Vec2& off_px, const std::array<double, 3>& covariance_px2) {
-  const auto& [xx, xy, yy] = covariance_px2;
-  const double x = off_px[0], y = off_px[1];
-  return (yy * x * x - 2 * xy * x * y + xx * y * y) / (xx * yy - xy * xy);
 }
 
 int unknowns_of(const SurveyNet& net, bool free_sizes) {

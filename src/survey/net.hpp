@@ -47,15 +47,11 @@ struct SurveyNet {
   std::vector<SurveyStation> stations;
 };
 
-/// "tag36h11 5".
-std::string name_of(const BundleMarker& marker);
 /// Of those with `true`: "tag36h11 5, tag36h11 6".
 std::string names_of(const SurveyNet& net, const std::vector<bool>& chosen);
 
 /// Seen minus predicted of one corner, px. False where it is predicted behind the camera.
 bool residual(const SurveyNet& net, const SurveyStation& station, const Sight& sight, std::size_t corner, Vec2& off_px);
-/// Square of a residual in standard deviations of its covariance (px^2: of x, of x with y, of y).
-double whitened_square(const Vec2& off_px, const std::array<double, 3>& covariance_px2);
 
 /// Unknowns of the used stations' and of all markers' poses (and sizes) but the origin's.
 int unknowns_of(const SurveyNet& net, bool free_sizes);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "exact_math.hpp"
 #include "survey/deviations.hpp"
 #include "survey/net.hpp"
 #include "survey/settle.hpp"
@@ -12,8 +13,6 @@
 
 namespace berth {
 namespace {
-
-constexpr double kDegrees = 57.295779513082323;
 
 // Fewer leave nothing to tell a wrong reading by.
 constexpr int kLeastFrames = 5, kLeastSights = 3;

@@ -24,6 +24,8 @@ bool is_rotation(const Mat3& r) {
 
 }  // namespace
 
+std::string name_of(const BundleMarker& marker) { return marker.family->name + " " + std::to_string(marker.id); }
+
 const BundleMarker* Bundle::find(const MarkerFamily& family, int id) const {
   for (const BundleMarker& marker : markers) {
     if (marker.id == id && marker.family == &family) return &marker;
@@ -42,7 +44,7 @@ void Bundle::check() const {
     if (marker.family == nullptr) {
       throw Error(what + "marker " + std::to_string(marker.id) + " has no family; give one");
     }
-    const std::string which = what + marker.family->name + " " + std::to_string(marker.id);
+    const std::string which = what + name_of(marker);
     if (marker.id < 0 || marker.id >= static_cast<int>(marker.family->codes.size())) {
       throw Error(which + " does not exist; ids are 0 to " + std::to_string(marker.family->codes.size() - 1));
     }

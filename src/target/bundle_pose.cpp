@@ -28,9 +28,8 @@ double squares_off(const CameraModel& camera, const Pose& pose, const PoseCorner
   const Vec3 at = transform(pose, corner.point_m);
   if (!(at[2] > kNearest_m)) return kBehind;
   const Vec2 image = image_of(camera, at);
-  const double x = corner.seen_px[0] - image[0], y = corner.seen_px[1] - image[1];
-  const std::array<double, 3>& c = corner.covariance_px2;
-  const double squares = (c[2] * x * x - 2 * c[1] * x * y + c[0] * y * y) / (c[0] * c[2] - c[1] * c[1]);
+  const double squares =
+      whitened_square({corner.seen_px[0] - image[0], corner.seen_px[1] - image[1]}, corner.covariance_px2);
   return squares < kBehind ? squares : kBehind;
 }
 
@@ -81,22 +80,13 @@ void BundlePoser::find(const CameraModel& camera, const std::vector<Detection>& 
   bool has_other = other_of(camera, found, other);
   if (has_other && other.chi_square < found.chi_square) {
     // The start was the wrong one of two: what fits is judged again from the right one.
-    if (!solve(camera, other.pose, from, found) && !solve(camera, start, from, found)) {
-      result.kept_out = spare + static_cast<int>(sightings_.size());
-      return;
-    }
+    if (!solve(camera, other.pose, from, found) && !solve(camera, start, from, found)) return;
     has_other = other_of(camera, found, other);
     if (has_other && other.chi_square < found.chi_square) std::swap(found, other);
   }
-  report(found, result);
+  if (has_other) other = from_origin(other);
+  report(from_origin(found), has_other ? &other : nullptr, result);
   result.kept_out += spare;
-  if (!has_other) return;
-  const RefinedPose other_at_origin = from_origin(other);
-  result.uncertainty.has_other = true;
-  result.uncertainty.other = other_at_origin.pose;
-  result.uncertainty.other_covariance = other_at_origin.covariance;
-  result.uncertainty.other_error_px = other.error_px;
-  result.uncertainty.other_excess = other.chi_square - found.chi_square;
 }
 
 // Returns how many sightings there was no room for.
@@ -322,12 +312,10 @@ RefinedPose BundlePoser::from_origin(const RefinedPose& pose) const {
   return compose(pose, translation(-centre_[0], -centre_[1], -centre_[2]));
 }
 
-void BundlePoser::report(const RefinedPose& found, BundlePose& result) const {
-  const RefinedPose at_origin = from_origin(found);
+void BundlePoser::report(const RefinedPose& found, const RefinedPose* other, BundlePose& result) const {
   result.has_pose = true;
-  result.pose = at_origin.pose;
-  result.uncertainty.covariance = at_origin.covariance;
-  result.uncertainty.error_px = found.error_px;
+  result.pose = found.pose;
+  result.uncertainty = uncertainty_of(found, other);
   result.used = result.kept_out = result.corners_kept_out = 0;
   int corners = 0;
   for (std::size_t i = 0; i < in_.size(); i += 4) {

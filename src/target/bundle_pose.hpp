@@ -49,7 +49,7 @@ class BundlePoser {
   bool solve_robustly(const CameraModel& camera, const Pose& start, RefinedPose& result);
   bool mirrored(const Pose& pose, Pose& start) const;
   bool other_of(const CameraModel& camera, const RefinedPose& found, RefinedPose& other);
-  void report(const RefinedPose& found, BundlePose& result) const;
+  void report(const RefinedPose& found, const RefinedPose* other, BundlePose& result) const;
   RefinedPose from_origin(const RefinedPose& pose) const;
 
   Bundle bundle_;

@@ -46,16 +46,8 @@ bool marker_pose(const CameraModel& camera, double size_m, const std::array<std:
   if (found == 0) return false;
   if (found == 2 && refined[1].error_px < refined[0].error_px) std::swap(refined[0], refined[1]);
   pose = refined[0].pose;
-  uncertainty = {};
-  uncertainty.covariance = refined[0].covariance;
-  uncertainty.error_px = refined[0].error_px;
-  if (found == 2 && !same_pose(refined[0], refined[1])) {
-    uncertainty.has_other = true;
-    uncertainty.other = refined[1].pose;
-    uncertainty.other_error_px = refined[1].error_px;
-    uncertainty.other_covariance = refined[1].covariance;
-    uncertainty.other_excess = refined[1].chi_square - refined[0].chi_square;
-  }
+  const bool has_other = found == 2 && !same_pose(refined[0], refined[1]);
+  uncertainty = uncertainty_of(refined[0], has_other ? &refined[1] : nullptr);
   return true;
 }
 

@@ -62,14 +62,18 @@ bool add_seen(const CameraModel& camera, const Vec3& at, const PoseCorner& corne
   return true;
 }
 
+/// The row of an image coordinate: its derivative by a point, where a step of the pose moves that by dt + w x arm.
+inline std::array<double, 6> step_row(const Vec3& by_point, const Vec3& arm) {
+  const Vec3 by_turn = cross(arm, by_point);  // by_point · (w × arm)
+  return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
+}
+
 /// A corner of a target at `pose` in the camera frame: derivatives by translation, then rotation about the camera's
 /// axes.
 inline bool add_corner(const CameraModel& camera, const Pose& pose, const PoseCorner& corner, PoseNormal& normal) {
   const Vec3 arm = product(pose.R, corner.point_m);
-  return add_seen(camera, add(arm, pose.t), corner, normal, [&](const Vec3& by_point) -> std::array<double, 6> {
-    const Vec3 by_turn = cross(arm, by_point);  // by_point · (w × arm)
-    return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
-  });
+  return add_seen(camera, add(arm, pose.t), corner, normal,
+                  [&](const Vec3& by_point) { return step_row(by_point, arm); });
 }
 
 /// Levenberg-Marquardt from a pose nearby. `linearise(pose, normal)` fills the normal equations, or returns false where

@@ -40,6 +40,26 @@ bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size
   return true;
 }
 
+double whitened_square(const Vec2& off_px, const std::array<double, 3>& covariance_px2) {
+  const auto& [xx, xy, yy] = covariance_px2;
+  const double x = off_px[0], y = off_px[1];
+  return (yy * x * x - 2 * xy * x * y + xx * y * y) / (xx * yy - xy * xy);
+}
+
+PoseUncertainty uncertainty_of(const RefinedPose& found, const RefinedPose* other) {
+  PoseUncertainty known;
+  known.covariance = found.covariance;
+  known.error_px = found.error_px;
+  if (other != nullptr) {
+    known.has_other = true;
+    known.other = other->pose;
+    known.other_error_px = other->error_px;
+    known.other_covariance = other->covariance;
+    known.other_excess = other->chi_square - found.chi_square;
+  }
+  return known;
+}
+
 bool same_pose(const RefinedPose& a, const RefinedPose& b) {
   SquareMatrix<6> information{};
   return invert<6>(a.covariance, information) && quadratic<6>(information, step_between(a.pose, b.pose)) < kSame;

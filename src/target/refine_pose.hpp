@@ -42,6 +42,12 @@ struct RefinedPose {
 bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
                  RefinedPose& result, const PosePrior* prior = nullptr);
 
+/// Square of a residual (px) in standard deviations of its covariance (px^2: of x, of x with y, of y).
+double whitened_square(const std::array<double, 2>& off_px, const std::array<double, 3>& covariance_px2);
+
+/// What is known of `found`, and of the other solution where there is one.
+PoseUncertainty uncertainty_of(const RefinedPose& found, const RefinedPose* other);
+
 /// Whether two refinements came to one pose: they differ by less than a tenth of the first's standard deviation.
 bool same_pose(const RefinedPose& a, const RefinedPose& b);
 

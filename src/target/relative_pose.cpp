@@ -62,7 +62,7 @@ class BothViews {
       const Vec3 arm = product(pose.R, transform(dock_.marker, corner.point_m));
       const Vec3 at = transform(to_dock_, add(arm, pose.t));
       if (!add_seen(dock_.lens, at, corner, normal,
-                    [&](const Vec3& by_point) { return row(product(transposed(to_dock_.R), by_point), arm); })) {
+                    [&](const Vec3& by_point) { return step_row(product(transposed(to_dock_.R), by_point), arm); })) {
         return false;
       }
     }
@@ -71,7 +71,7 @@ class BothViews {
       const Vec3 arm = add(transform(robot_.marker, corner.point_m), scaled(pose.t, -1));
       const Vec3 at = transform(to_robot_, product(transposed(pose.R), arm));
       if (!add_seen(robot_.lens, at, corner, normal, [&](const Vec3& by_point) {
-            return row(scaled(product(pose.R, product(transposed(to_robot_.R), by_point)), -1), arm);
+            return step_row(scaled(product(pose.R, product(transposed(to_robot_.R), by_point)), -1), arm);
           })) {
         return false;
       }
@@ -80,11 +80,6 @@ class BothViews {
   }
 
  private:
-  static std::array<double, 6> row(const Vec3& by_point, const Vec3& arm) {
-    const Vec3 by_turn = cross(arm, by_point);
-    return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
-  }
-
   const Station &robot_, &dock_;
   Pose to_robot_, to_dock_;  // vehicle to camera
   std::array<PoseCorner, 4> seen_by_robot_, seen_by_dock_;
@@ -115,16 +110,7 @@ RelativePose result_of(const Solutions& best, int views) {
   RelativePose result;
   result.views = views;
   result.pose = best.of_robot[0].pose;
-  PoseUncertainty& known = result.uncertainty;
-  known.covariance = best.of_robot[0].covariance;
-  known.error_px = best.of_robot[0].error_px;
-  if (best.count > 1) {
-    known.has_other = true;
-    known.other = best.of_robot[1].pose;
-    known.other_error_px = best.of_robot[1].error_px;
-    known.other_covariance = best.of_robot[1].covariance;
-    known.other_excess = best.of_robot[1].chi_square - best.of_robot[0].chi_square;
-  }
+  result.uncertainty = uncertainty_of(best.of_robot[0], best.count > 1 ? &best.of_robot[1] : nullptr);
   return result;
 }
 
