@@ -32,15 +32,18 @@ struct Points {
   s32 area = 0;
   s32 x_min = 0, x_max = 0, y_min = 0, y_max = 0;
 
+  void make_room(int count) {
+    const std::size_t room = static_cast<std::size_t>(count) * 2 + 64;
+    if (x.size() >= room) return;
+    x.resize(room);
+    y.resize(room);
+    boundary.resize(room);
+  }
+
   /// Reads up to a vector past the last point, as the buffers of CPU backends allow.
   HWY_ATTR void load(const u32* words, int count) {
+    make_room(count);
     const std::size_t n = static_cast<std::size_t>(count);
-    const std::size_t room = n * 2 + 64;
-    if (x.size() < room) {
-      x.resize(room);
-      y.resize(room);
-      boundary.resize(room);
-    }
     const hn::ScalableTag<s32> lanes;
     const std::size_t step = hn::Lanes(lanes);
     const auto one = hn::Set(lanes, 1);
@@ -315,6 +318,8 @@ class Quad {
 void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads) {
   static thread_local Points kept;
   Points& loaded = kept;
+  // What contour_measure lets through has no more points: nothing is taken while frames fly.
+  loaded.make_room(p.max_height * 5 / 2 + 4);
   const u32* record = contours + CONTOUR_HEADER;
   const int filled = static_cast<int>(std::min(contours[1], static_cast<u32>(p.max_contours)));
   for (int slot = 0; slot < filled; ++slot, record += CONTOUR_WORDS, quads += QUAD_WORDS) {

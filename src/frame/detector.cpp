@@ -7,9 +7,8 @@
 #include <utility>
 
 #include "berth/error.hpp"
+#include "frame/detector_parts.hpp"
 #include "frame/digest.hpp"
-#include "frame/marker_plan.hpp"
-#include "frame/quads.hpp"
 #include "frame/stages.hpp"
 #include "target/bent_sides.hpp"
 #include "target/bundle_pose.hpp"
@@ -92,62 +91,14 @@ bool same_corners(const Corners& a, const Corners& b, double tolerance) {
   return true;
 }
 
-/// One search's results on the host: in the device's memory where the host reaches it, downloaded otherwise.
-class SearchResult {
- public:
-  explicit SearchResult(const MarkerSearch& search) : search_(search) {
-    if (search.quads->host() != nullptr) return;
-    contours_.resize(search.contours->bytes() / 4);
-    quads_.resize(search.quads->bytes() / 4);
-    edges_.resize(search.edges->bytes() / 4);
-  }
-  void download(Stream& stream) {
-    if (quads_.empty()) return;
-    stream.download(*search_.contours, contours_.data(), contours_.size() * 4);
-    stream.download(*search_.quads, quads_.data(), quads_.size() * 4);
-    stream.download(*search_.edges, edges_.data(), edges_.size() * 4);
-  }
-
-  /// How many slots the frame has filled.
-  int slots() const { return static_cast<int>(std::min(header()[1], static_cast<u32>(search_.geometry.max_contours))); }
-  /// Whether slot i holds a quadrilateral; `found` tells whether it has four corners.
-  bool quad(int i, QuadCandidate& candidate, bool& found) const {
-    const s32* quad =
-        (quads_.empty() ? static_cast<const s32*>(search_.quads->host()) : quads_.data()) + i * QUAD_WORDS;
-    const s32* edge =
-        (edges_.empty() ? static_cast<const s32*>(search_.edges->host()) : edges_.data()) + i * EDGE_WORDS;
-    if ((quad[0] & QUAD_VALID) == 0) return false;
-    found = to_candidate(quad, edge, search_.scale, candidate);
-    return true;
-  }
-  void note_capacities(CapacityUse* use) const {
-    const MarkerGeometry& g = search_.geometry;
-    use[0] = {search_.capacity_names[0], header()[0], static_cast<u32>(g.max_run_ends)};
-    use[1] = {search_.capacity_names[1], header()[1], static_cast<u32>(g.max_contours)};
-    use[2] = {search_.capacity_names[2], header()[2], static_cast<u32>(g.max_points)};
-  }
-
- private:
-  const u32* header() const {
-    return contours_.empty() ? static_cast<const u32*>(search_.contours->host()) : contours_.data();
-  }
-
-  const MarkerSearch& search_;
-  std::vector<u32> contours_;
-  std::vector<s32> quads_;
-  std::vector<s32> edges_;
-};
-
 }  // namespace
 
-struct Detector::Impl {
-  Impl(Backend& backend, int width, int height, const DetectorConfig& user_config)
+struct HostFinish::Impl {
+  Impl(int width, int height, const DetectorConfig& user_config)
       : config(user_config),
         families(find_families(config.families)),
         decoder(families, config.max_hamming),
-        bundles(bundle_posers(config.bundles, families)),
-        plan(backend, width, height, config),
-        stream(backend.make_stream()) {
+        bundles(bundle_posers(config.bundles, families)) {
     if (config.camera && !(config.marker_size_m > 0) && (bundles.empty() || config.marker_size_m != 0)) {
       throw Error("marker size is " + std::to_string(config.marker_size_m) + " m; give the side that the corners span");
     }
@@ -157,57 +108,25 @@ struct Detector::Impl {
     is_bending = config.camera && (config.camera->lens != LensModel::radial_tangential ||
                                    config.camera->distortion != std::array<double, 8>{});
     if (config.corner_method == CornerMethod::photometric) fit.emplace(config.camera, width, height);
-    if (plan.frame().host() == nullptr) staging.resize(plan.geometry().frame_bytes());
+  }
+
+  void reserve(const DeviceFrame& frame, FrameResult& result) {
     std::size_t slots = 0;
-    for (const MarkerSearch& search : plan.searches()) {
-      searches.emplace_back(search);
-      slots += static_cast<std::size_t>(search.geometry.max_contours);
-    }
+    for (const SearchResult& search : frame.searches()) slots += static_cast<std::size_t>(search.capacity());
     result.detections.reserve(slots);
     result.bundles.resize(bundles.size());
     refused.reserve(slots);
-    if (!staging.empty()) {  // drivers may finish compiling at the first launch: not in the first frame's time
-      stream->replay(plan.plan());
-      if (!stream->finish()) {
-        throw Error(std::string(backend.name()) + ": " + backend.device().name +
-                    " was lost on the first, empty frame; see berth doctor, or use another backend");
-      }
-    }
   }
 
-  u8* frame() { return staging.empty() ? static_cast<u8*>(plan.frame().host()) : staging.data(); }
-
-  void submit(View2D<const u8> image, const FrameStamp& stamp) {
-    const MarkerGeometry& g = plan.geometry();
-    if (image.width != g.width || image.height != g.height) {
-      throw Error("frame is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
-                  "; this detector was made for " + std::to_string(g.width) + "x" + std::to_string(g.height));
-    }
-    started = Clock::now();
-    result.stamp = stamp;
-    pad_frame(image, g, frame());
-    if (!staging.empty()) stream->upload(plan.frame(), staging.data(), staging.size());
-    stream->replay(plan.plan());
-    for (SearchResult& search : searches) search.download(*stream);
-  }
-
-  const FrameResult& collect() {
-    result.detections.clear();
-    std::fill(result.bundles.begin(), result.bundles.end(), BundlePose{});
-    refused.clear();
-    result.digests.clear();
-    result.quads = 0;
-    const bool alive = stream->finish();
+  void finish(DeviceFrame& frame, FrameResult& result) {
     const Clock::time_point on_host = Clock::now();
-    if (!alive) {
-      result.status = FrameStatus::device_lost;
-      return result;
-    }
-    for (const SearchResult& search : searches) decode(search);
+    clear(result);
+    refused.clear();
+    for (const SearchResult& search : frame.searches()) decode(frame, search, result);
     resolve_duplicates(result.detections);
-    if (is_bending) straighten();
+    if (is_bending) straighten(result);
     const Clock::time_point decoded = Clock::now();
-    if (fit) refine_corners();
+    if (fit) refine_corners(frame, result);
     const Clock::time_point refined = Clock::now();
     if (config.camera) {
       for (Detection& detection : result.detections) add_pose(detection);
@@ -216,28 +135,37 @@ struct Detector::Impl {
       }
     }
     const Clock::time_point posed = Clock::now();
-    result.times = {StageTime{"device", ns_between(started, on_host)},
+    result.times = {StageTime{"device", frame.done_ns() - frame.submitted_ns()},
                     StageTime{"decode", ns_between(on_host, decoded)}, StageTime{"pose", ns_between(refined, posed)},
                     StageTime{fit ? "corners" : "", ns_between(decoded, refined)}};
     result.status = result.detections.empty() ? FrameStatus::no_target : FrameStatus::ok;
-    for (std::size_t i = 0; i < searches.size(); ++i) searches[i].note_capacities(&result.capacities[3 * i]);
+    for (std::size_t i = 0; i < frame.searches().size(); ++i) {
+      frame.searches()[i].note_capacities(&result.capacities[3 * i]);
+    }
     for (const CapacityUse& use : result.capacities) {
       if (use.needed > use.capacity) result.status = FrameStatus::overflow;
     }
-    if (config.digests) take_digests();
-    return result;
+    if (config.digests) take_digests(frame, result);
   }
 
-  void decode(const SearchResult& search) {
-    const MarkerGeometry& g = plan.geometry();
-    const View2D<const u8> image{frame(), g.width, g.height, g.padded_width};
+  static void clear(FrameResult& result) {
+    result.detections.clear();
+    std::fill(result.bundles.begin(), result.bundles.end(), BundlePose{});
+    result.digests.clear();
+    result.quads = 0;
+  }
+
+  void decode(DeviceFrame& frame, const SearchResult& search, FrameResult& result) {
+    const View2D<const u8> image = frame.image();
     QuadCandidate candidate;
     Detection detection;
     for (int i = 0; i < search.slots(); ++i) {
       bool has_corners = false;
       if (!search.quad(i, candidate, has_corners)) continue;
       ++result.quads;
-      if (!has_corners || is_cut_off(candidate, g.width, g.height) || is_known(candidate)) continue;
+      if (!has_corners || is_cut_off(candidate, image.width, image.height) || is_known(candidate, result)) {
+        continue;
+      }
       if (decoder.decode(image, candidate, detection)) {
         result.detections.push_back(detection);
       } else {
@@ -246,9 +174,8 @@ struct Detector::Impl {
     }
   }
 
-  void refine_corners() {
-    const MarkerGeometry& g = plan.geometry();
-    const View2D<const u8> image{frame(), g.width, g.height, g.padded_width};
+  void refine_corners(DeviceFrame& frame, FrameResult& result) {
+    const View2D<const u8> image = frame.image();
     for (Detection& d : result.detections) {
       if (!fit->refine(image, *d.family, d.id, d.corners, d.corner_fit.emplace())) {
         d.corner_fit.reset();
@@ -259,7 +186,7 @@ struct Detector::Impl {
   }
 
   /// The edges' corners are where straight lines meet; the lens bends the marker's sides.
-  void straighten() {
+  void straighten(FrameResult& result) const {
     for (Detection& d : result.detections) {
       straighten_corners(*config.camera, d.corners);
       find_center(d);
@@ -289,7 +216,7 @@ struct Detector::Impl {
   }
 
   /// Whether these corners have been decoded or refused already: most quadrilaterals are found by several searches.
-  bool is_known(const QuadCandidate& candidate) const {
+  bool is_known(const QuadCandidate& candidate, const FrameResult& result) const {
     for (const Detection& known : result.detections) {
       const double side = std::sqrt(square_distance(known.corners[0], known.corners[1]));
       if (same_corners(candidate.fine, known.corners, std::max(1.0, side / 10))) return true;
@@ -300,11 +227,12 @@ struct Detector::Impl {
     return false;
   }
 
-  void take_digests() {
-    StageReader reader(plan, *stream);
-    for (std::size_t i = 0; i < plan.stages().size(); ++i) {
+  static void take_digests(DeviceFrame& frame, FrameResult& result) {
+    StageReader reader(frame.plan(), frame.stream());
+    const std::vector<Stage>& stages = frame.plan().stages();
+    for (std::size_t i = 0; i < stages.size(); ++i) {
       const std::vector<u32>& words = reader.read(i);
-      result.digests.push_back({plan.stages()[i].name, digest_words(words.data(), words.size())});
+      result.digests.push_back({stages[i].name, digest_words(words.data(), words.size())});
     }
   }
 
@@ -312,15 +240,53 @@ struct Detector::Impl {
   std::vector<const MarkerFamily*> families;
   Decoder decoder;
   std::vector<BundlePoser> bundles;
-  MarkerPlan plan;
-  std::unique_ptr<Stream> stream;
   std::optional<PhotometricFit> fit;
-  bool is_bending = false;  // straight lines in the world are not straight in the image
-  std::vector<u8> staging;  // empty where the host reaches the device's memory
-  std::vector<SearchResult> searches;
+  bool is_bending = false;       // straight lines in the world are not straight in the image
   std::vector<Corners> refused;  // candidates of the frame that hold no marker
+};
+
+HostFinish::HostFinish(int width, int height, const DetectorConfig& config)
+    : impl_(std::make_unique<Impl>(width, height, config)) {}
+HostFinish::~HostFinish() = default;
+HostFinish::HostFinish(HostFinish&&) noexcept = default;
+HostFinish& HostFinish::operator=(HostFinish&&) noexcept = default;
+
+void HostFinish::reserve(const DeviceFrame& frame, FrameResult& result) { impl_->reserve(frame, result); }
+void HostFinish::finish(DeviceFrame& frame, FrameResult& result) { impl_->finish(frame, result); }
+void HostFinish::give_up(FrameResult& result) {
+  Impl::clear(result);
+  result.status = FrameStatus::device_lost;
+}
+
+struct Detector::Impl {
+  Impl(Backend& backend, int width, int height, const DetectorConfig& config)
+      : device(backend, width, height, config), host(width, height, config) {
+    host.reserve(device, result);
+  }
+
+  void submit(View2D<const u8> image, const FrameStamp& stamp) {
+    const MarkerGeometry& g = device.geometry();
+    if (image.width != g.width || image.height != g.height) {
+      throw Error("frame is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                  "; this detector was made for " + std::to_string(g.width) + "x" + std::to_string(g.height));
+    }
+    result.stamp = stamp;
+    pad_frame(image, g, device.pixels());
+    device.submit();
+  }
+
+  const FrameResult& collect() {
+    if (device.finish()) {
+      host.finish(device, result);
+    } else {
+      HostFinish::give_up(result);
+    }
+    return result;
+  }
+
+  DeviceFrame device;
+  HostFinish host;
   FrameResult result;
-  Clock::time_point started;
 };
 
 double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, int id) {
@@ -342,11 +308,11 @@ const FrameResult& Detector::detect(View2D<const u8> image, const FrameStamp& st
   submit(image, stamp);
   return collect();
 }
-std::size_t Detector::device_bytes() const { return impl_->plan.device_bytes(); }
+std::size_t Detector::device_bytes() const { return impl_->device.device_bytes(); }
 
 std::optional<StageDifference> first_difference(Detector& first, Detector& second) {
-  StageReader a(first.impl_->plan, *first.impl_->stream);
-  StageReader b(second.impl_->plan, *second.impl_->stream);
+  StageReader a(first.impl_->device.plan(), first.impl_->device.stream());
+  StageReader b(second.impl_->device.plan(), second.impl_->device.stream());
   return first_difference(a, b);
 }
 

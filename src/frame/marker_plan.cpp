@@ -224,13 +224,18 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
 
 void pad_frame(View2D<const u8> image, const MarkerGeometry& geometry, u8* frame) {
   const std::size_t stride = static_cast<std::size_t>(geometry.padded_width);
-  const std::size_t width = static_cast<std::size_t>(geometry.width);
-  for (int y = 0; y < geometry.padded_height; ++y) {
-    u8* to = frame + static_cast<std::size_t>(y) * stride;
-    const u8* from = image.row(std::min(y, geometry.height - 1));
-    std::memcpy(to, from, width);
-    std::memset(to + width, from[geometry.width - 1], stride - width);
+  for (int y = 0; y < geometry.height; ++y) {
+    std::memcpy(frame + static_cast<std::size_t>(y) * stride, image.row(y), static_cast<std::size_t>(geometry.width));
   }
+  pad_in_place(geometry, frame);
+}
+
+void pad_in_place(const MarkerGeometry& geometry, u8* frame) {
+  const std::size_t stride = static_cast<std::size_t>(geometry.padded_width);
+  const std::size_t width = static_cast<std::size_t>(geometry.width);
+  u8* row = frame;
+  for (int y = 0; y < geometry.height; ++y, row += stride) std::memset(row + width, row[width - 1], stride - width);
+  for (int y = geometry.height; y < geometry.padded_height; ++y, row += stride) std::memcpy(row, row - stride, stride);
 }
 
 }  // namespace berth

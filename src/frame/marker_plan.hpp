@@ -102,5 +102,7 @@ class MarkerPlan {
 
 /// Copies an image into a padded frame, repeating its last column and row into the padding.
 void pad_frame(View2D<const u8> image, const MarkerGeometry& geometry, u8* frame);
+/// The padding alone, of a frame whose pixels are written.
+void pad_in_place(const MarkerGeometry& geometry, u8* frame);
 
 }  // namespace berth

@@ -1,5 +1,6 @@
 #include "support/faulty_backend.hpp"
 
+#include <atomic>
 #include <utility>
 #include <vector>
 
@@ -15,17 +16,17 @@ struct FaultyPlan final : Plan {
 
 class FaultyEvent final : public Event {
  public:
-  FaultyEvent(std::unique_ptr<Event> behind, const bool& lost) : behind_(std::move(behind)), lost_(lost) {}
+  FaultyEvent(std::unique_ptr<Event> behind, const std::atomic<bool>& lost) : behind_(std::move(behind)), lost_(lost) {}
   bool wait() override { return behind_->wait() && !lost_; }
 
  private:
   std::unique_ptr<Event> behind_;
-  const bool& lost_;
+  const std::atomic<bool>& lost_;
 };
 
 class FaultyStream final : public Stream {
  public:
-  FaultyStream(std::unique_ptr<Stream> behind, const Fault& fault, bool& lost)
+  FaultyStream(std::unique_ptr<Stream> behind, const Fault& fault, std::atomic<bool>& lost)
       : behind_(std::move(behind)), fault_(fault), lost_(lost) {}
 
   void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
@@ -58,7 +59,7 @@ class FaultyStream final : public Stream {
 
   std::unique_ptr<Stream> behind_;
   const Fault& fault_;
-  bool& lost_;
+  std::atomic<bool>& lost_;
 };
 
 class FaultyBackend final : public Backend {
@@ -80,7 +81,7 @@ class FaultyBackend final : public Backend {
  private:
   Backend& behind_;
   Fault fault_;
-  bool lost_ = false;
+  std::atomic<bool> lost_ = false;  // streams of several threads see it
 };
 
 }  // namespace

@@ -1,0 +1,327 @@
+#include "berth/pipeline.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <exception>
+#include <future>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "berth/error.hpp"
+#include "frame/detector_parts.hpp"
+#include "monotonic.hpp"
+#include "pipeline/slot_ring.hpp"
+#include "pipeline/thread_setup.hpp"
+
+namespace berth {
+
+const char* name_of(Lap lap) {
+  static constexpr std::array<const char*, kLaps> kNames = {"wait",    "device", "queue",  "decode",
+                                                            "corners", "pose",   "latency"};
+  return kNames[static_cast<std::size_t>(lap)];
+}
+
+const char* name_of(DropCause cause) {
+  static constexpr std::array<const char*, kDropCauses> kNames = {"device", "host", "reader"};
+  return kNames[static_cast<std::size_t>(cause)];
+}
+
+namespace {
+
+constexpr int kMostSlots = 1024;
+
+const PipelineConfig& checked(const PipelineConfig& config) {
+  if (config.slots < 2 || config.slots > kMostSlots) {
+    throw Error("a pipeline of " + std::to_string(config.slots) + " slots; give 2 to " + std::to_string(kMostSlots) +
+                ", usually 4");
+  }
+  if (config.realtime_priority < 0 || config.realtime_priority > 99) {
+    throw Error("real-time priority " + std::to_string(config.realtime_priority) + "; give 1 to 99, or 0 for none");
+  }
+  if (config.cores.size() > 2) {
+    throw Error(std::to_string(config.cores.size()) +
+                " cores for a pipeline's threads; give two, the device's and the host's, or one for both");
+  }
+  for (const std::int64_t deadline : config.deadlines_ns) {
+    if (deadline <= 0) throw Error("a deadline of " + std::to_string(deadline) + " ns; give more than 0");
+  }
+  return config;
+}
+
+/// One slot: a frame on each backend, of which one has the pixels, and its result.
+struct Slot {
+  std::vector<std::unique_ptr<DeviceFrame>> devices;
+  std::size_t on = 0;
+  FrameResult result;
+  std::int64_t arrived_ns = 0, taken_ns = 0;
+  PipelineFrame frame;
+
+  DeviceFrame& device() { return *devices[on]; }
+};
+
+void count_one(std::atomic<u64>& counter) {
+  counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+struct Pipeline::Impl {
+  Impl(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& wanted, Deliver callback)
+      : config(checked(wanted)), deliver(std::move(callback)), ring(config.slots, config.overrun) {
+    if (backends.empty()) throw Error("a pipeline needs a backend; give at least one");
+    slots.resize(static_cast<std::size_t>(config.slots));
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      Slot& slot = slots[i];
+      for (Backend* backend : backends) {
+        slot.devices.push_back(std::make_unique<DeviceFrame>(*backend, width, height, config.detector));
+      }
+      if (i == 0) host = std::make_unique<HostFinish>(width, height, config.detector);
+      host->reserve(slot.device(), slot.result);
+      slot.frame.result = &slot.result;
+      slot.frame.slot = static_cast<int>(i);
+    }
+  }
+
+  ~Impl() { end(); }
+
+  Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
+
+  void start() {
+    if (device_thread.joinable()) throw Error("the pipeline is running; stop it before it is started again");
+    ring.reopen();
+    error = nullptr;
+    for (LatencyHistogram& lap : laps) lap.clear();
+    for (std::atomic<u64>* counter : {&run_again, &device_lost, &late[0], &late[1]}) *counter = 0;
+    std::promise<void> device_ready;
+    std::promise<void> host_ready;
+    std::future<void> device_set = device_ready.get_future();
+    std::future<void> host_set = host_ready.get_future();
+    device_thread = std::thread([this, ready = std::move(device_ready)]() mutable { run_device(ready); });
+    host_thread = std::thread([this, ready = std::move(host_ready)]() mutable { run_host(ready); });
+    try {
+      device_set.get();
+      host_set.get();
+    } catch (...) {
+      end();
+      throw;
+    }
+  }
+
+  void end() {
+    ring.close();
+    ring.discard();
+    if (device_thread.joinable()) device_thread.join();
+    if (host_thread.joinable()) host_thread.join();
+  }
+
+  /// Name, core and priority of the calling thread; `index` 0 is the device's, 1 the host's.
+  void set_up(std::size_t index) const {
+    name_thread(index == 0 ? "berth-device" : "berth-host");
+    if (!config.cores.empty()) pin_to_core(config.cores[std::min(index, config.cores.size() - 1)]);
+    if (config.realtime_priority > 0) make_realtime(config.realtime_priority);
+  }
+
+  void run_device(std::promise<void>& ready) {
+    try {
+      set_up(0);
+      // Operations may keep memory by thread, which they take when they first run.
+      for (const std::unique_ptr<DeviceFrame>& device : slots.front().devices) device->warm_up();
+      ready.set_value();
+    } catch (...) {
+      ready.set_exception(std::current_exception());
+    }
+    bool again = false;
+    for (int i = ring.take(again); i >= 0; i = ring.take(again)) {
+      Slot& slot = at(i);
+      const std::size_t to = active.load(std::memory_order_acquire);
+      if (slot.on != to) {
+        DeviceFrame& next = *slot.devices[to];
+        pad_frame(slot.device().image(), next.geometry(), next.pixels());
+        slot.on = to;
+      }
+      if (!again) slot.taken_ns = monotonic_ns();
+      slot.device().submit();
+      ring.on_device(i);
+    }
+  }
+
+  void run_host(std::promise<void>& ready) {
+    try {
+      set_up(1);
+      ready.set_value();
+    } catch (...) {
+      ready.set_exception(std::current_exception());
+    }
+    for (int i = ring.await(); i >= 0; i = ring.await()) {
+      Slot& slot = at(i);
+      const bool alive = wait_for_device(i);
+      ring.on_host();
+      const std::int64_t began_ns = monotonic_ns();
+      if (alive) {
+        host->finish(slot.device(), slot.result);
+      } else {
+        HostFinish::give_up(slot.result);
+        count_one(device_lost);
+      }
+      take_times(slot, began_ns);
+      if (deliver && !error) call_back(slot.frame);
+      ring.done(i, !deliver);
+    }
+  }
+
+  /// Waits for the frame; one whose device was lost runs again on the next backend, as all after it do.
+  bool wait_for_device(int i) {
+    Slot& slot = at(i);
+    while (!slot.device().finish()) {
+      const std::size_t now = active.load(std::memory_order_relaxed);
+      if (slot.on == now) {
+        if (now + 1 == slot.devices.size()) return false;
+        active.store(now + 1, std::memory_order_release);
+      }
+      count_one(run_again);
+      ring.run_again(i);
+    }
+    return true;
+  }
+
+  void take_times(Slot& slot, std::int64_t began_ns) {
+    const std::int64_t now_ns = monotonic_ns();
+    DeviceFrame& device = slot.device();
+    std::array<std::int64_t, kLaps>& ns = slot.frame.laps_ns;
+    ns.fill(0);
+    const auto lap = [&ns](Lap which) -> std::int64_t& { return ns[static_cast<std::size_t>(which)]; };
+    lap(Lap::wait) = slot.taken_ns - slot.arrived_ns;
+    lap(Lap::device) = device.done_ns() - device.submitted_ns();
+    lap(Lap::queue) = began_ns - device.done_ns();
+    if (slot.result.status != FrameStatus::device_lost) {
+      lap(Lap::decode) = slot.result.times[1].ns;
+      lap(Lap::pose) = slot.result.times[2].ns;
+      lap(Lap::corners) = slot.result.times[3].ns;
+    }
+    const FrameStamp& stamp = slot.result.stamp;
+    const bool is_timed = std::strcmp(stamp.clock, "monotonic") == 0;
+    lap(Lap::latency) = now_ns - (is_timed ? stamp.mid_exposure_ns : slot.arrived_ns);
+    slot.frame.image = device.image();
+    slot.frame.backend = slot.on;
+    for (std::size_t i = 0; i < kLaps; ++i) laps[i].add(ns[i]);
+    for (std::size_t i = 0; i < late.size(); ++i) {
+      if (lap(Lap::latency) > config.deadlines_ns[i]) count_one(late[i]);
+    }
+  }
+
+  void call_back(const PipelineFrame& frame) {
+    ring.delivering();
+    try {
+      deliver(frame);
+    } catch (...) {
+      error = std::current_exception();
+      ring.close();
+      ring.discard();
+    }
+  }
+
+  const PipelineFrame* fetch(bool waiting) {
+    const int slot = ring.fetch(waiting);
+    return slot < 0 ? nullptr : &at(slot).frame;
+  }
+
+  const PipelineConfig config;
+  const Deliver deliver;
+  std::vector<Slot> slots;
+  std::unique_ptr<HostFinish> host;
+  SlotRing ring;
+  /// Which backend frames are run on; only the host's thread, which sees a loss, moves it.
+  std::atomic<std::size_t> active = 0;
+  std::atomic<u64> run_again = 0, device_lost = 0;
+  std::array<std::atomic<u64>, 2> late = {};
+  std::array<LatencyHistogram, kLaps> laps;
+  /// What the callback has thrown; the host's thread's until it is joined.
+  std::exception_ptr error;
+  int filling = -1;
+  std::thread device_thread, host_thread;
+};
+
+Pipeline::Pipeline(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& config,
+                   Deliver deliver)
+    : impl_(std::make_unique<Impl>(backends, width, height, config, std::move(deliver))) {}
+Pipeline::~Pipeline() = default;
+
+void Pipeline::start() { impl_->start(); }
+void Pipeline::stop() {
+  // With a callback, what is under way still gets there.
+  if (impl_->deliver) {
+    impl_->ring.close();
+    if (impl_->device_thread.joinable()) impl_->device_thread.join();
+    if (impl_->host_thread.joinable()) impl_->host_thread.join();
+  }
+  impl_->end();
+  if (impl_->error) std::rethrow_exception(std::exchange(impl_->error, nullptr));
+}
+void Pipeline::close() { impl_->ring.close(); }
+
+FrameSlot Pipeline::begin() {
+  impl_->filling = impl_->ring.begin();
+  if (impl_->filling < 0) return {};
+  Slot& slot = impl_->at(impl_->filling);
+  slot.on = impl_->active.load(std::memory_order_acquire);
+  const MarkerGeometry& g = slot.device().geometry();
+  return {{slot.device().pixels(), g.width, g.height, g.padded_width}, impl_->filling};
+}
+
+void Pipeline::commit(const FrameStamp& stamp) {
+  if (impl_->filling < 0) return;
+  Slot& slot = impl_->at(impl_->filling);
+  impl_->filling = -1;
+  pad_in_place(slot.device().geometry(), slot.device().pixels());
+  slot.result.stamp = stamp;
+  slot.arrived_ns = monotonic_ns();
+  impl_->ring.commit();
+}
+
+bool Pipeline::push(View2D<const u8> image, const FrameStamp& stamp) {
+  const MarkerGeometry& g = impl_->slots.front().devices.front()->geometry();
+  if (image.width != g.width || image.height != g.height) {
+    throw Error("frame is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                "; this pipeline was made for " + std::to_string(g.width) + "x" + std::to_string(g.height));
+  }
+  const FrameSlot slot = begin();
+  if (slot.image.data == nullptr) return false;
+  for (int y = 0; y < image.height; ++y) {
+    std::memcpy(slot.image.row(y), image.row(y), static_cast<std::size_t>(image.width));
+  }
+  commit(stamp);
+  return true;
+}
+
+const PipelineFrame* Pipeline::poll() { return impl_->fetch(false); }
+const PipelineFrame* Pipeline::next() { return impl_->fetch(true); }
+
+PipelineCounts Pipeline::counts() const {
+  PipelineCounts counts = impl_->ring.counts();
+  counts.run_again = impl_->run_again;
+  counts.device_lost = impl_->device_lost;
+  for (std::size_t i = 0; i < counts.late.size(); ++i) counts.late[i] = impl_->late[i];
+  return counts;
+}
+
+const LatencyHistogram& Pipeline::times(Lap lap) const { return impl_->laps[static_cast<std::size_t>(lap)]; }
+
+PipelineMemory Pipeline::memory() const {
+  PipelineMemory memory;
+  memory.slots = impl_->config.slots;
+  memory.frame_bytes = impl_->slots.front().devices.front()->geometry().frame_bytes();
+  memory.host_bytes = sizeof(Impl);
+  for (const Slot& slot : impl_->slots) {
+    for (const std::unique_ptr<DeviceFrame>& device : slot.devices) {
+      memory.device_bytes += device->device_bytes();
+      memory.host_bytes += device->host_bytes();
+    }
+    memory.host_bytes += sizeof(Slot) + slot.result.detections.capacity() * sizeof(Detection) +
+                         slot.result.bundles.capacity() * sizeof(BundlePose);
+  }
+  return memory;
+}
+
+}  // namespace berth

@@ -1,0 +1,14 @@
+#pragma once
+
+namespace berth {
+
+/// Keeps the calling thread to one core. Throws Error where the process may not use it.
+void pin_to_core(int core);
+
+/// Gives the calling thread a SCHED_FIFO priority of 1 to 99. Throws Error that says how to be permitted.
+void make_realtime(int priority);
+
+/// What the calling thread is called in top and in debuggers: 15 characters.
+void name_thread(const char* name);
+
+}  // namespace berth
