@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "simd/simd_ops.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -6,39 +8,35 @@
 //
 #include <hwy/highway.h>
 
+#include "simd/bit_rows-inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
+// The last vector of a row reaches past it, where the next rows will be written; so the last rows are written elsewhere
+// first.
 void despeckle(const despeckle_params& p, const u32* bits, u32* clean) {
-  const hn::ScalableTag<u32> words;
-  const int lanes = static_cast<int>(hn::Lanes(words));
-  for (int y = 0; y < p.height; ++y) {
-    const u32* here = bits + static_cast<std::ptrdiff_t>(y) * p.row_words;
+  const RowTag words;
+  const int lanes = row_lanes();
+  const int row_words = p.row_words;
+  const int height = p.height;
+  u32 aside[kMaxRowWords + kRowSlack];
+  for (int y = 0; y < height; ++y, bits += row_words, clean += row_words) {
     // Beyond the first and the last row lies white; the row itself is masked out below.
-    const u32* above = y > 0 ? here - p.row_words : here;
-    const u32* below = y + 1 < p.height ? here + p.row_words : here;
-    const u32 has_above = y > 0 ? ~0u : 0u;
-    const u32 has_below = y + 1 < p.height ? ~0u : 0u;
-    u32* out = clean + static_cast<std::ptrdiff_t>(y) * p.row_words;
-    const auto scalar = [&](int x) {
-      const u32 left = x > 0 ? here[x - 1] >> 31 : 0u;
-      const u32 right = x + 1 < p.row_words ? here[x + 1] << 31 : 0u;
-      out[x] =
-          here[x] & ((here[x] << 1) | left | (here[x] >> 1) | right | (above[x] & has_above) | (below[x] & has_below));
-    };
-    scalar(0);
-    int x = 1;
-    for (; x + lanes < p.row_words; x += lanes) {
-      const auto v = hn::LoadU(words, here + x);
-      const auto left = hn::Or(hn::ShiftLeft<1>(v), hn::ShiftRight<31>(hn::LoadU(words, here + x - 1)));
-      const auto right = hn::Or(hn::ShiftRight<1>(v), hn::ShiftLeft<31>(hn::LoadU(words, here + x + 1)));
-      const auto up = hn::And(hn::LoadU(words, above + x), hn::Set(words, has_above));
-      const auto down = hn::And(hn::LoadU(words, below + x), hn::Set(words, has_below));
-      hn::StoreU(hn::And(v, hn::Or(hn::Or(left, right), hn::Or(up, down))), words, out + x);
+    const u32* above = y > 0 ? bits - row_words : bits;
+    const u32* below = y + 1 < height ? bits + row_words : bits;
+    const auto above_mask = hn::Set(words, y > 0 ? ~0u : 0u);
+    const auto below_mask = hn::Set(words, y + 1 < height ? ~0u : 0u);
+    u32* const out = (height - 1 - y) * row_words >= lanes ? clean : aside;
+    RightMover right;
+    for (int x = 0; x < row_words; x += lanes) {
+      const auto here = row_words_at(bits, x, row_words);
+      const auto left = hn::Or(hn::ShiftRight<1>(here), hn::ShiftLeft<31>(row_words_at(bits, x + 1, row_words)));
+      const auto up = hn::And(hn::LoadU(words, above + x), above_mask);
+      const auto down = hn::And(hn::LoadU(words, below + x), below_mask);
+      hn::StoreU(hn::And(here, hn::Or(hn::Or(left, right.moved(here)), hn::Or(up, down))), words, out + x);
     }
-    for (; x < p.row_words; ++x) scalar(x);
+    if (out == aside) std::copy(aside, aside + row_words, clean);
   }
 }
 
