@@ -13,6 +13,8 @@
 //
 #include <hwy/highway.h>
 
+#include "simd/choose-inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
 
@@ -203,7 +205,7 @@ class Measurer {
   // A run's pair of nodes tells whether a contour may begin there. One that leads straight back is a contour of its
   // own, one row high.
   HWY_ATTR void find_tops() {
-    const hn::CappedTag<u32, 8> words;
+    constexpr hn::CappedTag<u32, 8> words;
     const int lanes = static_cast<int>(hn::Lanes(words));
     const u32 forth_step = static_cast<u32>(top_) & 0xffffu;
     const u32 back_step = top_ == 1 && p_.min_side > 1 ? 0xffffu : ~0u;  // ~0: no node's
@@ -218,10 +220,10 @@ class Measurer {
       hn::LoadInterleaved2(words, nodes_ + first, starts, ends);
       const auto tops = hn::AndNot(hn::VecFromMask(words, hn::Eq(hn::ShiftRight<16>(ends), back)),
                                    hn::VecFromMask(words, hn::Eq(hn::ShiftRight<16>(starts), forth)));
-      const auto chosen = hn::MaskFromVec(tops);
+      const Choice<decltype(words)> chosen(hn::MaskFromVec(tops));
       const auto ids = hn::Add(hn::ShiftLeft<1>(hn::Iota(words, 0)), hn::Set(words, static_cast<u32>(first)));
-      hn::StoreU(hn::Compress(ids, chosen), words, out);
-      out += hn::CountTrue(words, chosen);
+      chosen.store(ids, out);
+      out += chosen.count();
     }
     for (; first < kept_; first += 2) {
       if (nodes_[first] >> 16 == forth_step) *out++ = static_cast<u32>(first);

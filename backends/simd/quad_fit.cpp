@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <cstring>
+#include <cmath>
 #include <vector>
 
 #include "simd/simd_ops.hpp"
@@ -27,23 +27,27 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// Points of one contour, twice over so that arcs may pass the first point, with room for a vector's overhang.
 struct Points {
   std::vector<s32> x;
-  std::vector<s32> y;         // row centres
-  std::vector<s32> boundary;  // the row boundary the walk follows after the point
+  std::vector<s32> y;  // row centres
+  const u32* words = nullptr;
+  int count = 0;
   s32 area = 0;
   s32 x_min = 0, x_max = 0, y_min = 0, y_max = 0;
 
-  void make_room(int count) {
-    const std::size_t room = static_cast<std::size_t>(count) * 2 + 64;
+  void make_room(int most) {
+    const std::size_t room = static_cast<std::size_t>(most) * 2 + 64;
     if (x.size() >= room) return;
     x.resize(room);
     y.resize(room);
-    boundary.resize(room);
   }
 
   /// Reads up to a vector past the last point, as the buffers of CPU backends allow.
-  HWY_ATTR void load(const u32* words, int count) {
-    make_room(count);
+  HWY_ATTR void load(const u32* point_words, int point_count) {
+    make_room(point_count);
+    words = point_words;
+    count = point_count;
     const std::size_t n = static_cast<std::size_t>(count);
+    s32* const xs = x.data();
+    s32* const ys = y.data();
     const hn::ScalableTag<s32> lanes;
     const std::size_t step = hn::Lanes(lanes);
     const auto one = hn::Set(lanes, 1);
@@ -58,9 +62,12 @@ struct Points {
       const auto py = hn::ShiftRight<16>(word);
       const auto centre = hn::Or(py, one);
       const auto is_end = hn::And(py, one);
-      hn::StoreU(px, lanes, &x[i]);
-      hn::StoreU(centre, lanes, &y[i]);
-      hn::StoreU(hn::Add(py, is_end), lanes, &boundary[i]);
+      hn::StoreU(px, lanes, xs + i);
+      hn::StoreU(centre, lanes, ys + i);
+      if (i > 0) {  // the first vector comes when nothing reaches over it any more
+        hn::StoreU(px, lanes, xs + n + i);
+        hn::StoreU(centre, lanes, ys + n + i);
+      }
       const auto valid = hn::FirstN(lanes, n - i);
       const auto half = hn::ShiftRight<1>(px);
       const auto sign = hn::Sub(is_end, one);  // 0 for ends, -1 for starts, whose crack counts negative
@@ -70,14 +77,19 @@ struct Points {
       most_x = hn::Max(most_x, hn::IfThenElseZero(valid, px));
       most_y = hn::Max(most_y, hn::IfThenElseZero(valid, centre));
     }
-    std::memcpy(&x[n], x.data(), n * sizeof(s32));
-    std::memcpy(&y[n], y.data(), n * sizeof(s32));
-    std::memcpy(&boundary[n], boundary.data(), n * sizeof(s32));
+    hn::StoreU(hn::LoadU(lanes, xs), lanes, xs + n);
+    hn::StoreU(hn::LoadU(lanes, ys), lanes, ys + n);
     area = hn::GetLane(hn::SumOfLanes(lanes, sum));
     x_min = hn::GetLane(hn::MinOfLanes(lanes, least_x));
     y_min = hn::GetLane(hn::MinOfLanes(lanes, least_y));
     x_max = hn::GetLane(hn::MaxOfLanes(lanes, most_x));
     y_max = hn::GetLane(hn::MaxOfLanes(lanes, most_y));
+  }
+
+  /// The row boundary that the walk follows after a point.
+  HWY_INLINE s32 boundary_after(int i) const {
+    const u32 py = words[i < count ? i : i - count] >> 16;
+    return static_cast<s32>(py + (py & 1u));
   }
 };
 
@@ -165,7 +177,8 @@ class Quad {
     const s32 dx = x(vertex_[k + 1]) - x(vertex_[k]);
     const s32 dy = y(vertex_[k + 1]) - y(vertex_[k]);
     far_[k] = far.index;
-    length_[k] = static_cast<s32>(square_root(static_cast<u32>(dx * dx + dy * dy)));
+    // Exact: a double holds any such square, and the root of one less than a square is well below a whole number.
+    length_[k] = static_cast<s32>(std::sqrt(static_cast<double>(static_cast<u32>(dx * dx + dy * dy))));
     const u32 cross = static_cast<u32>(far.value);
     const u32 length = static_cast<u32>(std::max(length_[k], 1));
     height_[k] = static_cast<s32>(cross / length * 16 + cross % length * 16 / length);
@@ -219,12 +232,19 @@ class Quad {
     return good && polygon * turn_ > 0 && std::abs(polygon * turn_ - contour) <= slack;
   }
 
+  // Each vertex moves to where its neighbours' chord is farthest; what did not change since the last round is not looked
+  // at again.
   HWY_ATTR bool polish() {
+    int looked_from[4] = {-1, -1, -1, -1};
+    int looked_to[4];
     for (int move = 0; move < 12; ++move) {
       const int k = move % 4;
       const int from = vertex_[(k + 3) % 4];
       int to = vertex_[(k + 1) % 4];
       if (to <= from) to += count_;
+      if (looked_from[k] == from && looked_to[k] == to) continue;
+      looked_from[k] = from;
+      looked_to[k] = to;
       const int moved = farthest_from_chord(points_, from, to).index;
       if (moved >= 0) vertex_[k] = moved % count_;
     }
@@ -279,7 +299,7 @@ class Quad {
       const bool rightward = s.u_to > s.u_from;
       for (int i = vertex_[k]; i < vertex_[k + 1]; ++i) {
         if ((x(i + 1) > x(i)) != rightward) continue;
-        const s32 v = (points_.boundary[static_cast<std::size_t>(i)] - s.v_middle) >> s.halvings;
+        const s32 v = (points_.boundary_after(i) - s.v_middle) >> s.halvings;
         const s32 end = std::min(std::max(x(i), x(i + 1)), last + 1);
         for (s32 u = std::max(std::min(x(i), x(i + 1)), first) | 1; u < end; u += 2)
           add((u - s.u_middle) >> s.halvings, v);

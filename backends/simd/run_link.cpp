@@ -1,6 +1,5 @@
 // Run ends linked. The overlaps of the runs of two rows, in raster order, tell all: what links to what depends on two
 // neighbouring overlaps only.
-#define HWY_WANT_AVX3_DL
 #include <algorithm>
 #include <cstring>
 
@@ -13,6 +12,7 @@
 #include <hwy/highway.h>
 
 #include "simd/bit_rows-inl.hpp"
+#include "simd/choose-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
@@ -38,28 +38,36 @@ HWY_INLINE RowWords last_before(const u32* offsets, int base_at, int word) {
   return hn::Add(hn::LoadU(words, offsets + word), bases);
 }
 
+/// A row as the upper one of the next: its bits, where they change, and the last run ends before its words.
+struct RowAbove {
+  u32 bits[kMaxRowWords + kRowSlack];
+  u32 changes[kMaxRowWords + kRowSlack];
+  u32 before[kMaxRowWords + kRowSlack];
+};
+
 /// Adds the words of a row and the one above to the list of `count`; returns how many it then has. `word`: the first of
-/// the row.
+/// the row. `above` becomes this row.
 HWY_NOINLINE int list_overlaps(const u32* row, int row_words, const u32* offsets, int base_at, int word, int count,
-                             OverlapWords& list) {
+                             RowAbove& above, OverlapWords& list) {
   const RowTag words;
   const int lanes = row_lanes();
-  RightMover right_above, right_here, right_both;
-  const u32* const above = row - row_words;
+  RightMover right_here, right_both;
   for (int x = 0; x < row_words; x += lanes) {
-    const auto a = row_words_at(above, x, row_words);
-    const auto h = row_words_at(row, x, row_words);
-    const auto both = hn::And(a, h);
+    const auto here = row_words_at(row, x, row_words);
+    const auto both = hn::And(here, hn::LoadU(words, above.bits + x));
     const auto begin = hn::AndNot(right_both.moved(both), both);
-    const auto changes_above = hn::Xor(a, right_above.moved(a));
-    const auto changes_here = hn::Xor(h, right_here.moved(h));
-    const auto some = hn::Ne(begin, hn::Zero(words));
-    hn::StoreU(hn::Compress(begin, some), words, list.begins + count);
-    hn::StoreU(hn::Compress(changes_above, some), words, list.above + count);
-    hn::StoreU(hn::Compress(changes_here, some), words, list.here + count);
-    hn::StoreU(hn::Compress(last_before(offsets, base_at, word + x - row_words), some), words, list.up + count);
-    hn::StoreU(hn::Compress(last_before(offsets, base_at, word + x), some), words, list.low + count);
-    count += static_cast<int>(hn::CountTrue(words, some));
+    const auto changes = hn::Xor(here, right_here.moved(here));
+    const auto before = last_before(offsets, base_at, word + x);
+    const Choice<RowTag> some(hn::Ne(begin, hn::Zero(words)));
+    some.store(begin, list.begins + count);
+    some.store(hn::LoadU(words, above.changes + x), list.above + count);
+    some.store(changes, list.here + count);
+    some.store(hn::LoadU(words, above.before + x), list.up + count);
+    some.store(before, list.low + count);
+    hn::StoreU(here, words, above.bits + x);
+    hn::StoreU(changes, words, above.changes + x);
+    hn::StoreU(before, words, above.before + x);
+    count += some.count();
   }
   return count;
 }
@@ -160,11 +168,12 @@ void run_link(const run_link_params& p, const u32* bits, const u32* offsets, con
   OverlapWords& list = kept_list;
   Overlaps& overlaps = kept_overlaps;
   overlaps.up[0] = overlaps.low[0] = ~0u;
-  for (int y = 1; y < rows;) {
+  RowAbove above = {};  // white lies above the first row
+  for (int y = 0; y < rows;) {
     int listed = 0;
     for (; y < rows && listed < OverlapWords::kRoom; ++y) {
       const int word = y * row_words;
-      listed = list_overlaps(bits + word, row_words, offsets, base_at, word, listed, list);
+      listed = list_overlaps(bits + word, row_words, offsets, base_at, word, listed, above, list);
     }
     const int count = find_overlaps(list, listed, overlaps);
     if (count > 0) link(overlaps, count, nodes);

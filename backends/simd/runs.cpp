@@ -1,5 +1,4 @@
 // Run ends: counted and written.
-#define HWY_WANT_AVX3_DL  // has what compresses 16-bit lanes
 #include <algorithm>
 
 #include "reference/layout.hpp"
@@ -12,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include "simd/bit_rows-inl.hpp"
+#include "simd/choose-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
@@ -73,45 +73,10 @@ void run_count(const run_count_params& p, const u32* bits, u32* offsets) {
   }
 }
 
-#if HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_AVX3_DL
-
-/// The places of a byte's set bits, lowest first.
-struct BitPlaces {
-  u8 of[256][8];
-};
-constexpr BitPlaces find_bit_places() {
-  BitPlaces places{};
-  for (int byte = 0; byte < 256; ++byte) {
-    int n = 0;
-    for (int bit = 0; bit < 8; ++bit) {
-      if ((byte >> bit & 1) != 0) places.of[byte][n++] = static_cast<u8>(bit);
-    }
-  }
-  return places;
-}
-constexpr BitPlaces kBitPlaces = find_bit_places();
-
-#endif
-
 /// Where the set bits of a word are, added to `first`. Returns the end of what was written; something may lie behind it,
 /// never at or past `limit`.
 HWY_INLINE u32* emit_word(u32 edges, u32 first, u32* out, const u32* limit) {
-#if HWY_TARGET == HWY_AVX3_DL
-  // Sixteen bits of place are compressed at once, and seldom are there more than sixteen of them.
-  const hn::FixedTag<std::uint16_t, 32> places;
-  const hn::FixedTag<u32, 16> words;
-  if (limit - out >= 32) {
-    const auto found = hn::Compress(hn::Iota(places, 0), hn::LoadMaskBits(places, reinterpret_cast<const u8*>(&edges)));
-    const auto base = hn::Set(words, first);
-    hn::StoreU(hn::Add(hn::PromoteTo(words, hn::LowerHalf(found)), base), words, out);
-    const u32 count = popcount(edges);
-    if (count > 16) {
-      hn::StoreU(hn::Add(hn::PromoteTo(words, hn::UpperHalf(hn::Half<decltype(places)>(), found)), base), words,
-                 out + 16);
-    }
-    return out + count;
-  }
-#elif HWY_TARGET != HWY_SCALAR
+#if HWY_TARGET != HWY_SCALAR
   // A byte at a time from a table: more instructions than bit by bit where edges are few, but nothing to foresee.
   const hn::CappedTag<u32, 8> words;
   const hn::Rebind<u8, decltype(words)> places;
@@ -148,10 +113,11 @@ struct EdgeWords {
     for (int x = 0; x <= row_words; x += row_lanes()) {
       const auto here = row_words_at(row, x, row_words);
       const auto changes = hn::Xor(here, right.moved(here));
-      const auto some = hn::Ne(changes, hn::Zero(words));
-      hn::StoreU(hn::Compress(changes, some), words, edges + count);
-      hn::StoreU(hn::Compress(hn::ShiftLeft<5>(hn::Iota(words, static_cast<u32>(x))), some), words, first + count);
-      count += static_cast<int>(hn::CountTrue(words, some));
+      const Choice<RowTag> some(hn::Ne(changes, hn::Zero(words)));
+      some.store(changes, edges + count);
+      const auto pixels = hn::Add(hn::ShiftLeft<5>(hn::Iota(words, 0)), hn::Set(words, static_cast<u32>(x * 32)));
+      some.store(pixels, first + count);
+      count += some.count();
     }
   }
 };
