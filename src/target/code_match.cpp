@@ -5,6 +5,7 @@
 
 #include "target/blur.hpp"
 #include "target/evidence.hpp"
+#include "target/near_words.hpp"
 #include "target/short_list.hpp"
 
 namespace berth {
@@ -131,12 +132,10 @@ template <class Likely>
 bool any_likely(const std::vector<u64>& words, u64 seen, int distance, const Likely& likely) {
   if (words.size() > kMaxNearScan) return true;
   constexpr std::size_t kBlock = 64;
-  std::array<u8, kBlock> bits;
   for (std::size_t begin = 0; begin < words.size(); begin += kBlock) {
     const std::size_t size = std::min(kBlock, words.size() - begin);
-    for (std::size_t i = 0; i < size; ++i) bits[i] = static_cast<u8>(count_bits(words[begin + i] ^ seen));
-    for (std::size_t i = 0; i < size; ++i) {
-      if (bits[i] <= distance && likely(words[begin + i])) return true;
+    for (u64 near = near_words(&words[begin], size, seen, distance); near != 0; near &= near - 1) {
+      if (likely(words[begin + static_cast<std::size_t>(__builtin_ctzll(near))])) return true;
     }
   }
   return false;

@@ -52,17 +52,17 @@ Layout::Layout(const MarkerFamily& family)
     const double far_side = w - near_side;
     for (int i = 0; i < border_width; ++i) {
       const double along = i + 0.5;
-      ring.push_back({near_side, along, light});
-      ring.push_back({far_side, along, light});
+      ring.add(near_side, along, light);
+      ring.add(far_side, along, light);
       if (inside && (i == 0 || i == border_width - 1)) continue;  // the corner modules are there already
-      ring.push_back({along, near_side, light});
-      ring.push_back({along, far_side, light});
+      ring.add(along, near_side, light);
+      ring.add(along, far_side, light);
     }
     for (const double along : {0.25 * w, 0.75 * w}) {
-      probe.push_back({near_side, along, light});
-      probe.push_back({far_side, along, light});
-      probe.push_back({along, near_side, light});
-      probe.push_back({along, far_side, light});
+      probe.add(near_side, along, light);
+      probe.add(far_side, along, light);
+      probe.add(along, near_side, light);
+      probe.add(along, far_side, light);
     }
   }
 }

@@ -9,10 +9,16 @@ namespace berth {
 /// Most data bits a family may have: a code is one u64.
 constexpr int kMaxCells = 64;
 
-/// A place to sample, in modules from the border's upper left.
-struct RingPoint {
-  double u, v;
-  bool light;
+/// Places to sample, in modules from the border's upper left.
+struct RingPoints {
+  std::vector<double> u, v;
+  std::vector<char> light;  // whether paper is light there
+
+  void add(double at_u, double at_v, bool is_light) {
+    u.push_back(at_u);
+    v.push_back(at_v);
+    light.push_back(is_light ? 1 : 0);
+  }
 };
 
 /// Where a group of families has its border and its data, whatever the codes.
@@ -35,10 +41,10 @@ struct Layout {
   /// The eight neighbours of each cell, row by row without the cell itself: [cells][8].
   std::vector<int> neighbours;
   /// The border's dark and light rings, one point a module.
-  std::vector<RingPoint> ring;
+  RingPoints ring;
   /// Sixteen places, enough to tell most quadrilaterals from a marker: eight inside, then the eight beside them
   /// outside.
-  std::vector<RingPoint> probe;
+  RingPoints probe;
 };
 
 }  // namespace berth

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "target/sample.hpp"
+#include "target/sample_points.hpp"
 
 namespace berth {
 namespace {
@@ -57,23 +57,37 @@ Seen fill(View2D<const u8> image, const QuadMap& map, const Layout& layout, cons
   const int nu = points_for(reading.module_u_px);
   const int nv = points_for(reading.module_v_px);
 
+  const int points = nu * nv;
+  double du[4], dv[4];  // of a cell's points from its centre
+  for (int k = 0; k < nu; ++k) du[k] = ((k + 0.5) / nu - 0.5) * spread;
+  for (int j = 0; j < nv; ++j) dv[j] = ((j + 0.5) / nv - 0.5) * spread;
+  double point_u[kMaxPoints], point_v[kMaxPoints];
+  int n = 0;
+  for (std::size_t i = 0; i < layout.x.size(); ++i) {
+    for (int j = 0; j < nv; ++j) {
+      for (int k = 0; k < nu; ++k, ++n) {
+        point_u[n] = layout.x[i] + 0.5 + du[k];
+        point_v[n] = layout.y[i] + 0.5 + dv[j];
+      }
+    }
+  }
+  PointSamples samples;
+  sample_points(image, map, point_u, point_v, n, samples);
+
   double mean = 0, square = 0;
+  n = 0;
   for (std::size_t i = 0; i < layout.x.size(); ++i) {
     const double u = layout.x[i] + 0.5;
     const double v = layout.y[i] + 0.5;
     double sum = 0;
     bool inside = true;
-    for (int j = 0; j < nv; ++j) {
-      for (int k = 0; k < nu; ++k) {
-        double x, y, value = 0;
-        map.at(u + ((k + 0.5) / nu - 0.5) * spread, v + ((j + 0.5) / nv - 0.5) * spread, x, y);
-        inside = sample(image, x, y, value) && inside;
-        sum += value;
-      }
+    for (int k = 0; k < points; ++k, ++n) {
+      inside = samples.inside[n] && inside;
+      sum += samples.value[n];
     }
     const Tones tones = shading.at(u, v);
     const double local = std::max((tones.light - tones.dark) / 2, kMinLocalContrast * reading.half_contrast);
-    const double value = sum / (nu * nv) - (tones.dark + tones.light) / 2;
+    const double value = sum / points - (tones.dark + tones.light) / 2;
     reading.value[i] = inside ? value * (reading.half_contrast / local) : 0;
     mean += reading.value[i];
     square += reading.value[i] * reading.value[i];
@@ -91,13 +105,15 @@ bool probe_border(View2D<const u8> image, const QuadMap& map, const Layout& layo
   double sum[2] = {0, 0};
   int count[2] = {0, 0};
   int n = 0;
-  for (const RingPoint& p : layout.probe) {
-    double x, y;
-    map.at(p.u, p.v, x, y);
-    if (!sample(image, x, y, value[n])) continue;
-    is_light[n] = p.light;
-    sum[p.light] += value[n];
-    ++count[p.light];
+  PointSamples samples;
+  sample_points(image, map, layout.probe.u.data(), layout.probe.v.data(), kProbes, samples);
+  for (std::size_t i = 0; i < kProbes; ++i) {
+    if (!samples.inside[i]) continue;
+    const bool light = layout.probe.light[i] != 0;
+    value[n] = samples.value[i];
+    is_light[n] = light;
+    sum[light] += value[n];
+    ++count[light];
     ++n;
   }
   if (count[0] < 4 || count[1] < 4) return false;

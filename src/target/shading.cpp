@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "target/sample.hpp"
+#include "target/sample_points.hpp"
 
 namespace berth {
 namespace {
@@ -53,20 +54,16 @@ struct Plane {
 
 bool PlaneShading::fit(View2D<const u8> image, const QuadMap& map, const Layout& layout) {
   middle_ = layout.border_width / 2.0;
-  constexpr int kMaxRing = 128;
-  struct Seen {
-    double u, v, value;
-    bool light;
-  };
-  std::array<Seen, kMaxRing> ring;
+  const RingPoints& ring = layout.ring;
+  const std::size_t n = ring.u.size();
+  PointSamples samples;
+  sample_points(image, map, ring.u.data(), ring.v.data(), static_cast<int>(n), samples);
   int points = 0;
   PlaneFit fit[2];
-  for (const RingPoint& p : layout.ring) {
-    double x, y, value;
-    map.at(p.u, p.v, x, y);
-    if (!sample(image, x, y, value)) continue;
-    ring[points++] = {p.u, p.v, value, p.light};
-    fit[p.light].add(p.u - middle_, p.v - middle_, value);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!samples.inside[i]) continue;
+    ++points;
+    fit[ring.light[i] != 0].add(ring.u[i] - middle_, ring.v[i] - middle_, samples.value[i]);
   }
   if (fit[0].n < 6 || fit[1].n < 6) return false;
   const Plane dark(fit[0]), light(fit[1]);
@@ -76,10 +73,13 @@ bool PlaneShading::fit(View2D<const u8> image, const QuadMap& map, const Layout&
 
   int wrong = 0;
   double squares = 0;
-  for (int i = 0; i < points; ++i) {
-    const Tones tones = at(ring[i].u, ring[i].v);
-    wrong += (ring[i].value > (tones.dark + tones.light) / 2) != ring[i].light;
-    const double error = ring[i].value - (ring[i].light ? tones.light : tones.dark);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!samples.inside[i]) continue;
+    const bool is_light = ring.light[i] != 0;
+    const double value = samples.value[i];
+    const Tones tones = at(ring.u[i], ring.v[i]);
+    wrong += (value > (tones.dark + tones.light) / 2) != is_light;
+    const double error = value - (is_light ? tones.light : tones.dark);
     squares += error * error;
   }
   misfit_ = std::sqrt(squares / points) / half_contrast();
