@@ -21,8 +21,16 @@ using WordsTag = hn::CappedTag<u32, 8>;
 using Sums = hn::Vec<SumsTag>;
 using Words = hn::Vec<WordsTag>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(SumsTag()));
+/// Of 16 registers: twelve sums of a convolution, eight of a fully connected layer, weights and inputs beside them.
+constexpr int kMostVectors = 2;
+constexpr int tile_pixels(int) { return 6; }
+constexpr int kTilePositions = 2;
+/// What inputs with a sign are moved by before they are multiplied: nothing (dot_vnni.hpp).
+constexpr u32 kOffset = 0;
 
 HWY_INLINE Sums zero_sums() { return hn::Zero(SumsTag()); }
+HWY_INLINE Sums negative(Sums sums) { return hn::Neg(sums); }
+HWY_INLINE s32 sum_of(Sums sums) { return hn::GetLane(hn::SumOfLanes(SumsTag(), sums)); }
 HWY_INLINE Words load_words(const u32* from) { return hn::LoadU(WordsTag(), from); }
 HWY_INLINE Words same_word(u32 word) { return hn::Set(WordsTag(), word); }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdint>
 
 #include "simd/simd_ops.hpp"
@@ -19,6 +20,8 @@ constexpr std::size_t kKnots = 104;
 /// Knots of the table's first segment, every 32 up to 2048: as bytes, for look-ups within registers.
 constexpr std::size_t kNear = 64;
 
+using Squares = std::uint16_t;
+
 struct Table {
   s32 value[kKnots];
   s32 rise[kKnots];  // to the next knot
@@ -26,6 +29,13 @@ struct Table {
   HWY_ALIGN u8 near_low[kNear];
   HWY_ALIGN u8 near_high[kNear];
   HWY_ALIGN u8 near_rise[kNear];
+#if HWY_TARGET == HWY_AVX3
+  bool rises_fit;                       // twice every rise fits 16 bits
+  HWY_ALIGN Squares near_value[kNear];  // for look-ups in two registers
+  HWY_ALIGN Squares far_value[kNear];   // from knot 64 on
+  HWY_ALIGN std::int16_t near_rises[kNear];
+  HWY_ALIGN std::int16_t far_rises[kNear];
+#endif
 };
 
 void prepare(const s32* knots, Table& table) {
@@ -39,6 +49,17 @@ void prepare(const s32* knots, Table& table) {
     table.near_high[i] = static_cast<u8>(knots[i] >> 8);
     table.near_rise[i] = static_cast<u8>(table.rise[i] & 255);
   }
+#if HWY_TARGET == HWY_AVX3
+  table.rises_fit =
+      std::all_of(table.rise, table.rise + kKnots - 1, [](s32 rise) { return rise > -16384 && rise < 16384; });
+  for (std::size_t i = 0; i < kNear; ++i) {
+    const std::size_t far = std::min(kNear + i, kKnots - 1);
+    table.near_value[i] = static_cast<Squares>(table.value[i]);
+    table.far_value[i] = static_cast<Squares>(table.value[far]);
+    table.near_rises[i] = static_cast<std::int16_t>(2 * table.rise[i]);
+    table.far_rises[i] = static_cast<std::int16_t>(2 * table.rise[far]);
+  }
+#endif
 }
 
 /// Outputs from activations and the sums of five half squares.
@@ -54,8 +75,6 @@ HWY_INLINE hn::Vec<D> responses(D d, const Table& table, hn::Vec<D> a, hn::Vec<D
   const auto scaled = hn::ShiftRight<14>(hn::Add(hn::Mul(a, factor), hn::Set(d, 8192)));
   return hn::Min(scaled, hn::Set(d, 127));
 }
-
-using Squares = std::uint16_t;
 
 template <class D>
 HWY_INLINE hn::Vec<D> sum_of_five(D d, const Squares* squares) {
@@ -117,11 +136,53 @@ HWY_INLINE hn::Vec<D> near_responses(D d, const Table& table, hn::Vec<D> a, hn::
 }
 #endif
 
-/// One pixel's channels: `squares` is room for them and two zeros before and after.
-void pixel_responses(const Table& table, const signed char* in, int channels, Squares* squares, signed char* out) {
-  for (int c = 0; c < channels; ++c) squares[c + 2] = static_cast<Squares>(in[c] * in[c] >> 1);
+#if HWY_TARGET == HWY_AVX3
+/// Entries of a table of 64 by the low six bits of 16-bit lanes.
+HWY_INLINE __m512i entries(const void* table, __m512i at) {
+  const char* bytes = static_cast<const char*>(table);
+  return _mm512_permutex2var_epi16(_mm512_load_si512(bytes), at, _mm512_load_si512(bytes + 64));
+}
+
+/// Outputs of 32 channels, where no activation is negative and the rises fit.
+HWY_INLINE __m256i responses_in_registers(const Table& table, __m512i a, __m512i sum) {
+  const auto all = [](int value) { return _mm512_set1_epi16(static_cast<short>(value)); };
+  const __mmask32 far = _mm512_test_epi16_mask(sum, all(0xf800));
+  const __m512i near_knot = _mm512_srli_epi16(sum, 5);
+  const __m512i far_knot = _mm512_sub_epi16(_mm512_srli_epi16(sum, 10), all(2));
+  const __m512i value =
+      _mm512_mask_blend_epi16(far, entries(table.near_value, near_knot), entries(table.far_value, far_knot));
+  const __m512i twice_rise =
+      _mm512_mask_blend_epi16(far, entries(table.near_rises, near_knot), entries(table.far_rises, far_knot));
+  const __m512i part = _mm512_mask_blend_epi16(far, _mm512_slli_epi16(_mm512_and_si512(sum, all(31)), 3),
+                                               _mm512_srli_epi16(_mm512_and_si512(sum, all(1023)), 2));
+  // (rise part + 128) >> 8: the product's high bits, and bit 7 of its low ones.
+  const __m512i high = _mm512_mulhi_epi16(twice_rise, _mm512_slli_epi16(part, 7));
+  const __m512i half = _mm512_and_si512(_mm512_srli_epi16(_mm512_mullo_epi16(twice_rise, part), 8), all(1));
+  const __m512i factor = _mm512_add_epi16(value, _mm512_add_epi16(high, half));
+  // (a factor + 2^13) >> 14 likewise.
+  const __m512i low = _mm512_mullo_epi16(a, factor);
+  const __m512i scaled = _mm512_add_epi16(
+      _mm512_add_epi16(_mm512_slli_epi16(_mm512_mulhi_epu16(a, factor), 2), _mm512_srli_epi16(low, 14)),
+      _mm512_and_si512(_mm512_srli_epi16(low, 13), all(1)));
+  return _mm512_cvtepi16_epi8(_mm512_min_epu16(scaled, all(127)));
+}
+#endif
+
+/// One pixel's channels, from their half squares between two zeros before and after.
+void pixel_responses(const Table& table, const signed char* in, int channels, const Squares* squares,
+                     signed char* out) {
   int c = 0;
-#if HWY_TARGET != HWY_SCALAR
+#if HWY_TARGET == HWY_AVX3
+  for (; table.rises_fit && c + 32 <= channels; c += 32) {
+    const __m512i a = _mm512_cvtepi8_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(in + c)));
+    if (_mm512_movepi16_mask(a) != 0) {
+      responses_by_gathers(table, in, c, c + 32, squares, out);
+      continue;
+    }
+    const __m512i sum = sum_of_five(hn::ScalableTag<Squares>(), squares + c).raw;
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + c), responses_in_registers(table, a, sum));
+  }
+#elif HWY_TARGET != HWY_SCALAR
   const hn::ScalableTag<Squares> d;
   const hn::RebindToSigned<decltype(d)> s;
   const hn::Rebind<signed char, decltype(d)> bytes;
@@ -136,7 +197,7 @@ void pixel_responses(const Table& table, const signed char* in, int channels, Sq
     }
   }
 #endif
-  responses_by_gathers(table, in, c, channels, squares, out);
+  if (c < channels) responses_by_gathers(table, in, c, channels, squares, out);
 }
 
 }  // namespace
@@ -146,11 +207,25 @@ void local_response_norm(const local_response_norm_params& p, const u32* tensor,
   const int channels = p.words * 4;
   Table knots;
   prepare(table, knots);
-  Squares squares[kMaxResponseChannels + 4] = {};
-  for (int pixel = first; pixel < last; ++pixel) {
-    const std::size_t at = static_cast<std::size_t>(pixel) * static_cast<std::size_t>(p.words);
-    pixel_responses(knots, reinterpret_cast<const signed char*>(tensor + at), channels, squares,
-                    reinterpret_cast<signed char*>(out_tensor + at));
+  // Some pixels' squares are all written before the first is read again: what was just written in other pieces is slow
+  // to read.
+  const int each = channels + 4;
+  Squares squares[2 * (kMaxResponseChannels + 4)] = {};
+  const int most = 2 * (kMaxResponseChannels + 4) / each;
+  for (int begin = first; begin < last; begin += most) {
+    const int end = std::min(last, begin + most);
+    const auto channels_of = [&](auto* words, int pixel) {
+      return words + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(p.words);
+    };
+    for (int pixel = begin; pixel < end; ++pixel) {
+      const signed char* in = reinterpret_cast<const signed char*>(channels_of(tensor, pixel));
+      Squares* to = squares + (pixel - begin) * each + 2;
+      for (int c = 0; c < channels; ++c) to[c] = static_cast<Squares>(in[c] * in[c] >> 1);
+    }
+    for (int pixel = begin; pixel < end; ++pixel) {
+      pixel_responses(knots, reinterpret_cast<const signed char*>(channels_of(tensor, pixel)), channels,
+                      squares + (pixel - begin) * each, reinterpret_cast<signed char*>(channels_of(out_tensor, pixel)));
+    }
   }
 }
 

@@ -1,6 +1,3 @@
-#include <algorithm>
-#include <cstring>
-
 #include "simd/simd_ops.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -14,9 +11,32 @@ namespace berth::simd_backend::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor) {
-  const hn::ScalableTag<signed char> d;
+namespace {
+
+/// The greatest of a kernel's pixels for channels [first, …) by whole vectors; returns how far it got.
+template <class D>
+HWY_INLINE std::size_t greatest(D d, const signed char* from, std::size_t kernel, std::size_t row_bytes,
+                                std::size_t channels, std::size_t first, signed char* out) {
   const std::size_t lanes = hn::Lanes(d);
+  std::size_t c = first;
+  for (; c + lanes <= channels; c += lanes) {
+    auto most = hn::LoadU(d, from + c);
+    for (std::size_t ky = 0; ky < kernel; ++ky) {
+      for (std::size_t kx = 0; kx < kernel; ++kx) {
+        most = hn::Max(most, hn::LoadU(d, from + ky * row_bytes + kx * channels + c));
+      }
+    }
+    hn::StoreU(most, d, out + c);
+  }
+  return c;
+}
+
+}  // namespace
+
+void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor) {
+  const hn::ScalableTag<signed char> widest;
+  const hn::CappedTag<signed char, 32> half;  // layers of 32 channels are usual, and less than the widest vectors
+  const hn::CappedTag<signed char, 4> word;
   const std::size_t channels = static_cast<std::size_t>(p.words) * 4;
   const std::size_t row_bytes = static_cast<std::size_t>(p.width) * channels;
   const std::size_t kernel = static_cast<std::size_t>(p.kernel_side);
@@ -27,25 +47,9 @@ void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor) {
     for (int x = 0; x < p.out_width; ++x, out += channels) {
       const signed char* from =
           in + static_cast<std::size_t>(from_y) * row_bytes + static_cast<std::size_t>(x * p.stride) * channels;
-      std::size_t c = 0;
-      for (; c + lanes <= channels; c += lanes) {
-        auto greatest = hn::LoadU(d, from + c);
-        for (std::size_t ky = 0; ky < kernel; ++ky) {
-          for (std::size_t kx = 0; kx < kernel; ++kx) {
-            greatest = hn::Max(greatest, hn::LoadU(d, from + ky * row_bytes + kx * channels + c));
-          }
-        }
-        hn::StoreU(greatest, d, out + c);
-      }
-      for (; c < channels; ++c) {
-        signed char greatest = from[c];
-        for (std::size_t ky = 0; ky < kernel; ++ky) {
-          for (std::size_t kx = 0; kx < kernel; ++kx) {
-            greatest = std::max(greatest, from[ky * row_bytes + kx * channels + c]);
-          }
-        }
-        out[c] = greatest;
-      }
+      std::size_t c = greatest(widest, from, kernel, row_bytes, channels, 0, out);
+      c = greatest(half, from, kernel, row_bytes, channels, c, out);
+      greatest(word, from, kernel, row_bytes, channels, c, out);
     }
   }
 }

@@ -73,6 +73,19 @@ void add_shapes(std::vector<OpCase>& cases) {
   for (const int width : {7, 15, 16, 17, 31, 33}) {
     cases.push_back(random_case("width_" + std::to_string(width), layer(1, 3, width, 2, 2, {3, 3, 1, 1, 1, 1}, 1, 4)));
   }
+  // Channels by whole vectors of several sizes, rows that their tiles fill, leave a rest of or overlap in.
+  for (const int width : {4, 8, 13, 14, 23}) {
+    cases.push_back(
+        random_case("channels_96_width_" + std::to_string(width), layer(1, 3, width, 2, 24, {3, 3, 1, 1, 1, 1}, 1, 4)));
+  }
+  cases.push_back(random_case("channels_48", layer(1, 3, 19, 2, 12, {3, 3, 1, 1, 1, 1}, 1, 4)));
+  cases.push_back(random_case("channels_64_groups", layer(2, 4, 11, 4, 32, {5, 5, 1, 1, 2, 2}, 2, 4)));
+  for (const int out_words : {4, 12, 16}) {
+    const convolve_params wide = layer(2, 12, 29, 1, out_words, {8, 2, 4, 1, 2, 1}, 1, 4);
+    cases.push_back(convolved("signed_channels_" + std::to_string(out_words * 4), wide,
+                              random_s8(in_words(wide), -128, 127, 10), random_weights(weight_words(wide), 11),
+                              random_channels(out_words * 4, 5000, 12)));
+  }
   // More padding at the far ends than at the near ones, up to taps that are all outside.
   convolve_params beyond = layer(1, 5, 6, 2, 3, {3, 3, 1, 1, 0, 0}, 1, 4);
   beyond.out_height += 4;

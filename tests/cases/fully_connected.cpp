@@ -48,6 +48,10 @@ std::vector<OpCase> fully_connected_cases() {
   cases.push_back(random_case("grid_1x1", {2, 5, 4, 8, 1, 1, 5, 4, 16, -1}));
   cases.push_back(random_case("grid_smaller", {2, 6, 7, 3, 3, 3, 2, 4, 8, -1}));
   cases.push_back(random_case("long_rows", {2, 2, 40, 8, 2, 40, 1, 1, 4, 6}));
+  cases.push_back(random_case("grid_of_long_rows", {1, 6, 9, 11, 4, 5, 3, 5, 12, 5}));
+  const fully_connected_params of_signed{2, 3, 9, 10, 3, 4, 1, 6, 8, 5};
+  cases.push_back(connected("signed_input", of_signed, random_s8(in_words(of_signed), -128, 127, 3),
+                            random_weights(weight_words(of_signed), 4), random_channels(8, 5000, 5)));
   const fully_connected_params p{2, 3, 4, 5, 3, 4, 1, 1, 8, 9};
   cases.push_back(constant_case("greatest", p, 127, 127, 0));
   cases.push_back(constant_case("least", p, 127, -127, 0));

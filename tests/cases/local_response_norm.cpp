@@ -55,6 +55,16 @@ std::vector<OpCase> local_response_norm_cases() {
   cases.push_back(normalized("random", 333, 8, random_activations(333 * 8, 6), random_table(7)));
   cases.push_back(normalized("one_word", 300, 1, random_activations(300, 8), falling_table()));
   cases.push_back(normalized("two_words", 99, 2, random_activations(198, 9), falling_table()));
+  // Whole vectors of channels with rises that fit 16 bits twice over, up and down; and with one too many.
+  std::vector<u32> zigzag = falling_table();
+  for (std::size_t i = 0; i < zigzag.size(); ++i) zigzag[i] = 30000u + static_cast<u32>(i % 2) * 16383u;
+  cases.push_back(normalized("wide", 200, 16, random_activations(200 * 16, 12), falling_table()));
+  cases.push_back(normalized("wide_dark", 200, 9, random_s8(200 * 9, 0, 60, 13), falling_table()));
+  cases.push_back(normalized("wide_zigzag", 200, 24, random_s8(200 * 24, 0, 90, 14), zigzag));
+  cases.push_back(normalized("wide_signed", 50, 8, random_s8(400, -40, 127, 15), zigzag));
+  zigzag[3] += 1;
+  cases.push_back(normalized("wide_steep", 100, 8, random_s8(800, 0, 60, 16), zigzag));
+  cases.push_back(normalized("many_pixels", 2000, 3, random_s8(6000, 0, 127, 17), falling_table()));
   cases.push_back(normalized("bright", 50, 24, random_s8(1200, 100, 127, 10), random_table(11)));
   return cases;
 }

@@ -28,6 +28,7 @@ std::vector<OpCase> max_pool_cases() {
       pooled("whole_tensor", 2, 6, 6, 5, 6, 1, 0, 127),
       pooled("signed", 1, 12, 12, 4, 3, 1, -128, 127),
       pooled("negative", 1, 8, 8, 1, 2, 1, -128, -120),
+      pooled("words_27", 1, 9, 7, 27, 3, 2, -128, 127),
       pooled("zero", 1, 8, 9, 2, 3, 3, 0, 0),
       pooled("nearly_equal", 2, 10, 10, 6, 3, 2, 126, 127),
   };
