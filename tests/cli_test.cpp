@@ -284,6 +284,52 @@ TEST(Run, EndsAtMaxFrames) {
             2u);
 }
 
+TEST(Run, PlaysAFolderAtACamerasPace) {
+  const ScratchFolder folder;
+  for (const char* name : {"1.png", "2.png", "3.png"}) std::filesystem::copy_file(kImage, folder / name);
+  cv::imwrite(folder / "4.png", cv::Mat(64, 64, CV_8U, cv::Scalar(90)));
+  const CommandRun run = run_berth({"run", "--source", "dir:" + folder.path(), "--fps", "20", "--minutes", "0.01",
+                                    "--slots", "3", "--deadline", "1000", "--json", folder / "log"});
+  EXPECT_EQ(run.exit_code, 2) << "the fourth is of another size";
+  EXPECT_THAT(run.err, HasSubstr("4.png: 64x64, but a camera's frames have one size"));
+  EXPECT_THAT(run.out, HasSubstr("3 slots: "));
+  EXPECT_THAT(run.out, HasSubstr("12 frames offered, "));
+  std::vector<json> log = CommandRun::json_lines(text_of(folder / "log"));
+  ASSERT_FALSE(log.empty());
+  const json summary = log.back()["summary"];
+  log.pop_back();
+  EXPECT_EQ(summary["offered"], 12);
+  EXPECT_EQ(summary["delivered"], log.size());
+  const json& dropped = summary["dropped"];
+  EXPECT_EQ(dropped["device"].get<std::size_t>() + dropped["host"].get<std::size_t>() +
+                dropped["reader"].get<std::size_t>() + log.size(),
+            12u);
+  EXPECT_EQ(summary["results"]["differing"], 0);
+  EXPECT_GT(summary["times_ms"]["latency"]["p50"], 0);
+  EXPECT_EQ(summary["late"].size(), 1u);
+  for (const json& line : log) {
+    EXPECT_EQ(line["clock"], "monotonic");
+    EXPECT_EQ(line["detections"][0]["id"], 7);
+    EXPECT_GT(line["latency_ms"], 0);
+    EXPECT_FALSE(line.contains("ms"));
+  }
+}
+
+TEST(Run, RefusesAPaceThatCannotBe) {
+  const auto refused = [](std::vector<std::string> options) {
+    options.insert(options.begin(), {"run", "--source", "file:" + kImage});
+    const CommandRun run = run_berth(options);
+    EXPECT_EQ(run.exit_code, 2);
+    return run.err;
+  };
+  EXPECT_THAT(refused({"--fps", "-3"}), HasSubstr("field '--fps'"));
+  EXPECT_THAT(refused({"--fps", "3", "--deadline", "0"}), HasSubstr("field '--deadline'"));
+  EXPECT_THAT(refused({"--fps", "3", "--slots", "1"}), HasSubstr("1 slots"));
+  EXPECT_THAT(refused({"--fps", "3", "--cores", "70000"}), HasSubstr("core 70000 does not exist"));
+  EXPECT_THAT(refused({"--fps", "3", "--lockstep", "simd,cpu"}), HasSubstr("leave --fps out"));
+  EXPECT_THAT(refused({"--slots", "4"}), HasSubstr("--fps"));
+}
+
 TEST(Demo, FliesFromFirstSightToTheMarker) {
   const ScratchFolder folder;
   const CommandRun run = run_berth({"demo", "--frames", "24", "--seed", "3", "--out", folder / "new/demo"});

@@ -304,30 +304,44 @@ TEST(Pipeline, SaysSoWhenTheLastDeviceIsLost) {
   EXPECT_EQ(pipeline.counts().delivered, 30u);
 }
 
-TEST(Pipeline, AllocatesNothingOnceStarted) {
+struct Load {
+  const char* backend;
+  Overrun overrun;
+  CornerMethod corners;
+  u64 frames;
+};
+
+class PipelineAllocations : public testing::TestWithParam<Load> {};
+
+TEST_P(PipelineAllocations, IsNotAllocatedOnceStarted) {
+  const Load& load = GetParam();
   PipelineConfig config;
   config.detector = posing();
-  config.detector.corner_method = CornerMethod::photometric;
-  for (const char* name : {"simd", "cpu"}) {
-    const std::unique_ptr<Backend> backend = open_backend(name);
-    for (const Overrun overrun : {Overrun::wait, Overrun::newest}) {
-      config.overrun = overrun;
-      u64 markers = 0;
-      Pipeline pipeline({backend.get()}, kWidth, kHeight, config,
-                        [&](const PipelineFrame& frame) { markers += frame.result->detections.size(); });
-      pipeline.start();
-      const std::size_t before = test::allocations();
-      const u64 count = std::string(name) == "cpu" ? 60 : overrun == Overrun::wait ? 1000 : 4000;
-      for (u64 i = 0; i < count; ++i) pipeline.push(picture(i), stamped(i));
-      pipeline.close();
-      PipelineCounts counts = pipeline.counts();
-      for (; counts.delivered + counts.all_dropped() < count; counts = pipeline.counts()) std::this_thread::yield();
-      EXPECT_EQ(test::allocations(), before) << name;
-      pipeline.stop();
-      EXPECT_TRUE(markers > 0 || overrun == Overrun::newest);
-    }
-  }
+  config.detector.corner_method = load.corners;
+  config.overrun = load.overrun;
+  const std::unique_ptr<Backend> backend = open_backend(load.backend);
+  u64 markers = 0;
+  ASSERT_EQ(frames().size(), kPictures);  // drawn by now
+  const std::size_t at_first = test::allocations();
+  Pipeline pipeline({backend.get()}, kWidth, kHeight, config,
+                    [&](const PipelineFrame& frame) { markers += frame.result->detections.size(); });
+  pipeline.start();
+  const std::size_t started = test::allocations();
+  EXPECT_GT(started, at_first);
+  for (u64 i = 0; i < load.frames; ++i) pipeline.push(picture(i), stamped(i));
+  pipeline.close();
+  PipelineCounts counts = pipeline.counts();
+  for (; counts.delivered + counts.all_dropped() < load.frames; counts = pipeline.counts()) std::this_thread::yield();
+  EXPECT_EQ(test::allocations(), started);
+  pipeline.stop();
+  EXPECT_TRUE(markers > 0 || load.overrun == Overrun::newest);
 }
+
+INSTANTIATE_TEST_SUITE_P(Loads, PipelineAllocations,
+                         testing::Values(Load{"simd", Overrun::wait, CornerMethod::edges, 2000},
+                                         Load{"simd", Overrun::newest, CornerMethod::edges, 4000},
+                                         Load{"simd", Overrun::wait, CornerMethod::photometric, 60},
+                                         Load{"cpu", Overrun::wait, CornerMethod::edges, 30}));
 
 TEST(Pipeline, LatencyCountsFromTheCamerasTimeAndLateFramesAreCounted) {
   const std::unique_ptr<Backend> backend = open_backend("simd");
@@ -339,7 +353,8 @@ TEST(Pipeline, LatencyCountsFromTheCamerasTimeAndLateFramesAreCounted) {
   FrameStamp stamp = stamped(0);
   stamp.clock = "monotonic";
   constexpr std::int64_t kTwoHours = std::int64_t{7200} * 1000000000;
-  stamp.mid_exposure_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count() - kTwoHours;
+  stamp.mid_exposure_ns =
+      std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count() - kTwoHours;
   pipeline.push(picture(0), stamp);
   for (u64 i = 1; i < 5; ++i) pipeline.push(picture(i), stamped(i));
   pipeline.stop();
@@ -382,7 +397,8 @@ TEST(Pipeline, RefusesWhatItCannotDo) {
   Pipeline pinned({backend.get()}, kWidth, kHeight, far);
   EXPECT_THAT([&] { pinned.start(); }, ThrowsMessage<Error>(HasSubstr("core 100000 does not exist")));
   Pipeline pipeline({backend.get()}, kWidth, kHeight, {});
-  EXPECT_THAT([&] { pipeline.push(pictures::uniform(64, 48, 9).view(), {}); }, ThrowsMessage<Error>(HasSubstr("64x48")));
+  EXPECT_THAT([&] { pipeline.push(pictures::uniform(64, 48, 9).view(), {}); },
+              ThrowsMessage<Error>(HasSubstr("64x48")));
 }
 
 TEST(Pipeline, RealTimePriorityIsHadOrTheRemedyNamed) {

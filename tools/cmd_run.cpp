@@ -16,8 +16,31 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml --bundle bundles/approach.yaml
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
+  berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops
 
 Ctrl-C ends the stream cleanly, with its summary.)";
+
+void add_pace_options(CLI::App& command, PaceOptions& pace) {
+  CLI::Option* fps = command
+                         .add_option("--fps", pace.fps,
+                                     "play the frames in real time, so many a second, as a camera would: the newest "
+                                     "wins, drops are counted")
+                         ->type_name("N");
+  const auto paced = [&](CLI::Option* option, const char* type) {
+    option->type_name(type)->needs(fps)->group("With --fps");
+  };
+  paced(command.add_option("--minutes", pace.minutes, "play them round and round until then"), "M");
+  paced(command.add_option("--slots", pace.slots, "frames under way at most, 2 or more")->capture_default_str(), "N");
+  paced(command.add_option("--cores", pace.cores, "the device's core and the host's, e.g. 0,1; or one for both")
+            ->delimiter(','),
+        "A,B");
+  paced(command.add_option("--realtime", pace.realtime, "SCHED_FIFO priority, 1 to 99, for what it is allowed to"),
+        "P");
+  paced(command.add_option("--deadline", pace.deadlines_ms, "later frames are counted, ms, one or two")
+            ->delimiter(',')
+            ->capture_default_str(),
+        "MS,MS");
+}
 
 }  // namespace
 
@@ -42,6 +65,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str();
+  add_pace_options(*command, options->stream.pace);
   add_engine_options(*command, options->stream.engine);
   add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);

@@ -267,6 +267,20 @@ std::optional<CameraModel> Engine::camera_for(int width, int height) const {
   }
 }
 
+DetectorConfig Engine::config_for(int width, int height) const {
+  DetectorConfig config = config_;
+  config.camera = camera_for(width, height);
+  if (!(config.marker_size_m > 0) && config.bundles.empty()) config.camera.reset();
+  if (!config.camera) config.marker_size_m = 0;
+  return config;
+}
+
+std::vector<Backend*> Engine::backends() const {
+  std::vector<Backend*> chain;
+  for (const auto& backend : backends_.backends) chain.push_back(backend.get());
+  return chain;
+}
+
 Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
   const auto known = std::find_if(detectors_.begin(), detectors_.end(), [&](const Sized& sized) {
     return sized.width == image.width && sized.height == image.height;
@@ -276,13 +290,9 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
     return detectors_.front();
   }
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
-  DetectorConfig config = config_;
-  config.camera = camera_for(image.width, image.height);
-  if (!(config.marker_size_m > 0) && config.bundles.empty()) config.camera.reset();
-  if (!config.camera) config.marker_size_m = 0;
+  const DetectorConfig config = config_for(image.width, image.height);
   Sized sized{image.width, image.height, nullptr, nullptr};
-  std::vector<Backend*> chain;
-  for (const auto& backend : backends_.backends) chain.push_back(backend.get());
+  const std::vector<Backend*> chain = backends();
   if (backends_.lockstep) {
     sized.pair = std::make_unique<Lockstep>(*chain[0], *chain[1], image.width, image.height, config);
   } else {

@@ -93,6 +93,11 @@ class Engine {
   std::optional<CameraModel> camera_for(int width, int height) const;
 
   const DetectorConfig& config() const { return config_; }
+  /// The same for frames of one size: without what they can have no pose of.
+  DetectorConfig config_for(int width, int height) const;
+  /// In order of fail-over.
+  std::vector<Backend*> backends() const;
+  bool is_lockstep() const { return backends_.lockstep; }
   /// The one whose results are given: it changes when a device is lost.
   Backend& backend() { return *backends_.backends[active_]; }
   /// "simd on NAME", and "in lockstep with" the other.

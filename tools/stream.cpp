@@ -26,6 +26,9 @@ namespace {
 
 using MarkerKey = std::pair<std::string, int>;
 
+/// Results of a played camera from one that is shown to the next.
+constexpr std::uint64_t kShowEvery = 10;
+
 /// One run_stream: what it was asked for and what it has gathered so far.
 class StreamRun {
  public:
@@ -42,6 +45,10 @@ class StreamRun {
 
   StreamSum run() {
     const InterruptWatch interrupt;
+    if (options_.pace.fps > 0) {
+      play(interrupt);
+      return {frames_, frames_with_markers_, differing_};
+    }
     while (options_.max_frames == 0 || frames_ < options_.max_frames) {
       const std::optional<SourceFrame> frame = next_readable(source_, console_, interrupt);
       if (!frame) break;
@@ -53,7 +60,40 @@ class StreamRun {
   }
 
  private:
+  /// At a camera's pace, all frames read beforehand.
+  void play(const InterruptWatch& interrupt) {
+    make_pipeline_config(options_.pace, {});  // what is wrong shows before the frames are read
+    std::vector<SourceFrame> frames = read_to_play(source_, options_.max_frames, console_, interrupt);
+    if (frames.empty()) throw Error("the source has no frame to play");
+    const GrayImage& first = frames.front().image;
+    make_engine(frames.front());
+    if (engine_->is_lockstep()) throw Error("--lockstep compares every frame; leave --fps out");
+    refuse_poses(frames.front());
+    const DetectorConfig config = engine_->config_for(first.width(), first.height());
+    PacedPlay paced(std::move(frames), options_.pace, engine_->backends(), config);
+    paced.describe(people_);
+    people_.flush();
+    paced.start();
+    std::size_t backend = 0;
+    while (const PipelineFrame* frame = paced.next()) {
+      const SourceFrame& source = paced.source_of(*frame);
+      if (frame->backend != backend) {
+        console_.note(source.label + ": the device was lost; the frame was run again on " +
+                      engine_->backends()[frame->backend]->name());
+        backend = frame->backend;
+      }
+      FrameResult result = *frame->result;
+      gather(source, result, 0, frame, paced.is_first_round(*frame));
+      if (interrupt.came()) paced.end();
+    }
+    view_.finish();
+    sum_up(interrupt.came(), &paced);
+  }
+
   std::optional<std::size_t> frames_expected() const {
+    if (options_.pace.fps > 0 && options_.pace.minutes > 0) {
+      return static_cast<std::size_t>(options_.pace.minutes * 60 * options_.pace.fps);
+    }
     const std::optional<std::size_t> total = source_.size();
     if (options_.max_frames == 0) return total;
     return std::min<std::size_t>(options_.max_frames, total.value_or(options_.max_frames));
@@ -82,9 +122,7 @@ class StreamRun {
 
   void handle(const SourceFrame& frame) {
     if (!engine_) make_engine(frame);
-    const std::string refusal = engine_->pose_refusal(frame.image.width(), frame.image.height());
-    if (!refusal.empty() && !refused_) console_.complain(frame.label + ": " + refusal);
-    refused_ = refused_ || !refusal.empty();
+    refuse_poses(frame);
     const Backend* before = &engine_->backend();
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
     FrameResult result = timed.frame;
@@ -93,45 +131,70 @@ class StreamRun {
                     engine_->describe());
     }
     if (timed.difference) report_difference(frame.label, *timed.difference);
+    wall_ns_ += timed.wall_ns;
+    cpu_ns_ += timed.cpu_ns;
+    gather(frame, result, timed.cpu_ns, nullptr, true);
+  }
+
+  void refuse_poses(const SourceFrame& frame) {
+    const std::string refusal = engine_->pose_refusal(frame.image.width(), frame.image.height());
+    if (!refusal.empty() && !refused_) console_.complain(frame.label + ": " + refusal);
+    refused_ = refused_ || !refusal.empty();
+  }
+
+  /// Takes a frame's result into everything that was asked for. `paced` where it came through a pipeline. Errors and
+  /// ways are of the first round alone: what is played for hours must not fill the memory.
+  void gather(const SourceFrame& frame, FrameResult& result, std::int64_t cpu_ns, const PipelineFrame* paced,
+              bool first_round) {
     scale_poses(result.detections, frame.truth);
-    if (options_.filter) filter(frame, result);
+    if (options_.filter) filter(frame, result, first_round);
     ++frames_;
     frames_with_markers_ += result.detections.empty() ? 0 : 1;
     overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
-    wall_ns_ += timed.wall_ns;
-    cpu_ns_ += timed.cpu_ns;
     if (!options_.log.empty()) {
-      std::ostream& log = options_.log == "-" ? console_.out() : log_;
-      Json line = to_json(result, frame.label, timed.cpu_ns, frame.truth);
+      Json line = to_json(result, frame.label, cpu_ns, frame.truth);
+      if (paced != nullptr) add_times(*paced, line);
       const std::vector<Bundle>& bundles = engine_->config().bundles;
       if (!bundles.empty()) line["bundles"] = to_json(result.bundles, bundles);
       if (options_.filter) line["filtered"] = filters_.to_json();
-      log << to_line(line) << '\n';
+      log() << to_line(line) << '\n';
     }
-    if (!frame.truth.empty()) {
+    if (!frame.truth.empty() && first_round) {
       score_.add(frame.truth, result.detections);
       score_bundles(result, frame.truth);
       has_truth_ = true;
     }
-    if (!options_.svg.empty()) remember_ways(result.detections, frame.truth);
+    if (!options_.svg.empty() && first_round) remember_ways(result.detections, frame.truth);
     if (!options_.picture.empty() && !result.detections.empty() &&
         result.detections.size() >= picture_detections_.size()) {
       picture_ = frame.image;
       picture_detections_ = result.detections;
     }
-    show(result, frame.truth);
+    // A camera's reader has no time to write what nobody can read.
+    if (paced == nullptr || frames_ % kShowEvery == 0) show(result, frame.truth);
     if (result.status == FrameStatus::device_lost) {
       throw Error(frame.label + ": the device was lost; see berth doctor, or use --backend simd");
     }
   }
 
-  void filter(const SourceFrame& frame, const FrameResult& result) {
-    if (std::string_view(frame.stamp.clock) == "none") {
+  std::ostream& log() { return options_.log == "-" ? console_.out() : log_; }
+
+  /// A camera's frame has a latency in place of its own share of the processor's time.
+  static void add_times(const PipelineFrame& frame, Json& line) {
+    line.erase("ms");
+    line["latency_ms"] = ms_of(frame.laps_ns[static_cast<std::size_t>(Lap::latency)]);
+    for (const Lap lap : {Lap::wait, Lap::queue}) {
+      line["stages_us"][name_of(lap)] = static_cast<double>(frame.laps_ns[static_cast<std::size_t>(lap)]) / 1e3;
+    }
+  }
+
+  void filter(const SourceFrame& frame, const FrameResult& result, bool scored) {
+    if (std::string_view(result.stamp.clock) == "none") {
       throw Error(frame.label +
                   ": frames without times cannot be filtered; leave --filter out, or use a video or a live source");
     }
     filters_.update(result, engine_->config(), frame.truth);
-    if (!frame.truth.empty()) filtered_score_.add(frame.truth, filters_.as_detections());
+    if (!frame.truth.empty() && scored) filtered_score_.add(frame.truth, filters_.as_detections());
   }
 
   void report_difference(const std::string& label, const StageDifference& difference) {
@@ -183,7 +246,9 @@ class StreamRun {
 
   void show(const FrameResult& result, const std::vector<TruthMarker>& truth) {
     const std::size_t n = result.detections.size();
-    std::string line = fmt::format("{:4.0f} fps  {} marker{}", frames_per_second(), n, n == 1 ? " " : "s");
+    std::string line =
+        fmt::format("{:4.0f} fps  {} marker{}", options_.pace.fps > 0 ? options_.pace.fps : frames_per_second(), n,
+                    n == 1 ? " " : "s");
     if (result.status == FrameStatus::overflow) line += ", overflow";
     std::vector<std::string> table;
     const Detection* largest = nullptr;
@@ -228,17 +293,21 @@ class StreamRun {
     return text;
   }
 
-  void sum_up(bool by_interrupt) {
+  void sum_up(bool by_interrupt, const PacedPlay* paced = nullptr) {
     if (by_interrupt) people_ << "interrupted\n";
     people_ << fmt::format("{} frame{}, {} with markers", frames_, frames_ == 1 ? "" : "s", frames_with_markers_);
     if (overflows_ > 0) people_ << fmt::format(", {} overflowed", overflows_);
     if (!options_.engine.lockstep.empty()) people_ << fmt::format(", {} differing", differing_);
-    if (frames_ > 0) {
+    if (frames_ > 0 && paced == nullptr) {
       const auto mean_ms = [&](std::int64_t ns) { return ms_of(ns) / static_cast<double>(frames_); };
       people_ << fmt::format("; detection alone {:.3f} ms a frame ({:.0f} frames/s), {:.3f} ms of processor time",
                              mean_ms(wall_ns_), frames_per_second(), mean_ms(cpu_ns_));
     }
     people_ << '\n';
+    if (paced != nullptr) {
+      paced->sum_up(people_);
+      if (!options_.log.empty()) log() << to_line(paced->summary()) << '\n';
+    }
     if (has_truth_) score_.print(people_);
     if (has_truth_ && options_.filter) {
       people_ << "filtered over time:\n";

@@ -6,6 +6,7 @@
 #include "berth/source.hpp"
 #include "console.hpp"
 #include "engine.hpp"
+#include "paced_play.hpp"
 
 namespace berth::cli {
 
@@ -23,6 +24,8 @@ struct StreamOptions {
   bool filter = false;
   /// 0 for all.
   std::uint64_t max_frames = 0;
+  /// In real time, through a pipeline.
+  PaceOptions pace;
 };
 
 /// What a stream came to.

@@ -38,7 +38,7 @@ class LatencyHistogram {
   static constexpr int kOctaves = 32;
   static constexpr std::size_t kExact = 256, kAnOctave = 128;
 
-  std::array<std::atomic<u64>, kExact + kAnOctave * kOctaves> counts_ = {};
+  std::array<std::atomic<u64>, kExact + kAnOctave* kOctaves> counts_ = {};
   std::atomic<u64> count_ = 0;
   std::atomic<std::int64_t> max_ = 0;
 };

@@ -198,7 +198,7 @@ struct Pipeline::Impl {
     if (slot.result.status != FrameStatus::device_lost) {
       lap(Lap::decode) = slot.result.times[1].ns;
       lap(Lap::pose) = slot.result.times[2].ns;
-      lap(Lap::corners) = slot.result.times[3].ns;
+      if (slot.result.times[3].stage[0] != '\0') lap(Lap::corners) = slot.result.times[3].ns;
     }
     const FrameStamp& stamp = slot.result.stamp;
     const bool is_timed = std::strcmp(stamp.clock, "monotonic") == 0;

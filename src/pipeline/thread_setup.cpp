@@ -47,6 +47,11 @@ void make_realtime(int priority) {
               "cap_sys_nice+ep on the program, --cap-add sys_nice for a container), or run without");
 }
 
+void make_ordinary() {
+  const sched_param parameters = {};
+  pthread_setschedparam(pthread_self(), SCHED_OTHER, &parameters);
+}
+
 void name_thread(const char* name) { pthread_setname_np(pthread_self(), name); }
 
 }  // namespace berth

@@ -8,6 +8,9 @@ void pin_to_core(int core);
 /// Gives the calling thread a SCHED_FIFO priority of 1 to 99. Throws Error that says how to be permitted.
 void make_realtime(int priority);
 
+/// Gives the calling thread the usual scheduling back.
+void make_ordinary();
+
 /// What the calling thread is called in top and in debuggers: 15 characters.
 void name_thread(const char* name);
 
