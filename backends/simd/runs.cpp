@@ -1,4 +1,5 @@
 // Run ends: counted and written.
+#define HWY_WANT_AVX3_DL  // counts bits and compresses lanes of 16
 #include <algorithm>
 
 #include "reference/layout.hpp"
@@ -76,7 +77,22 @@ void run_count(const run_count_params& p, const u32* bits, u32* offsets) {
 /// Where the set bits of a word are, added to `first`. Returns the end of what was written; something may lie behind it,
 /// never at or past `limit`.
 HWY_INLINE u32* emit_word(u32 edges, u32 first, u32* out, const u32* limit) {
-#if HWY_TARGET != HWY_SCALAR
+#if HWY_TARGET == HWY_AVX3_DL
+  // All 32 places are compressed at once; seldom are there more than sixteen of them.
+  const hn::FixedTag<std::uint16_t, 32> places;
+  const hn::FixedTag<u32, 16> words;
+  if (limit - out >= 32) {
+    const auto found = hn::Compress(hn::Iota(places, 0), hn::LoadMaskBits(places, reinterpret_cast<const u8*>(&edges)));
+    const auto base = hn::Set(words, first);
+    hn::StoreU(hn::Add(hn::PromoteTo(words, hn::LowerHalf(found)), base), words, out);
+    const u32 count = popcount(edges);
+    if (count > 16) {
+      hn::StoreU(hn::Add(hn::PromoteTo(words, hn::UpperHalf(hn::Half<decltype(places)>(), found)), base), words,
+                 out + 16);
+    }
+    return out + count;
+  }
+#elif HWY_TARGET != HWY_SCALAR
   // A byte at a time from a table: more instructions than bit by bit where edges are few, but nothing to foresee.
   const hn::CappedTag<u32, 8> words;
   const hn::Rebind<u8, decltype(words)> places;

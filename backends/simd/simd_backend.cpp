@@ -14,9 +14,11 @@ namespace berth::simd_backend {
   X(halve)                \
   X(tile_extrema)         \
   X(tile_histogram)       \
+  X(normalize)            \
   X(threshold)            \
   X(despeckle)            \
   X(run_count)            \
+  X(scan)                 \
   X(run_emit)             \
   X(run_link)             \
   X(contour_measure)      \

@@ -10,10 +10,12 @@ namespace berth::simd_backend {
 void halve(const halve_params& p, const u32* pixels, u32* half_pixels);
 void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, u32* maxima);
 void tile_histogram(const tile_histogram_params& p, const u32* minima, const u32* maxima, u32* histograms);
+void normalize(const normalize_params& p, const u32* histograms, u32* levels);
 void threshold(const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima, const u32* levels,
                u32* bits);
 void despeckle(const despeckle_params& p, const u32* bits, u32* clean);
 void run_count(const run_count_params& p, const u32* bits, u32* offsets);
+void scan(const scan_params& p, u32* values);
 void run_emit(const run_emit_params& p, const u32* bits, const u32* offsets, u32* cracks);
 void run_link(const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks, u32* nodes);
 void contour_measure(const contour_measure_params& p, const u32* nodes, const u32* offsets, u32* spans);
