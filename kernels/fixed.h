@@ -1,5 +1,6 @@
 // Integer arithmetic that operations share: the same text in every language.
 
+#ifndef BERTH_BYTES  // the prelude's own
 // Per byte of two words: 1 where a >= b, 0 elsewhere.
 FN u32 bytes_ge(u32 a, u32 b) {
   const u32 low = (a | 0x80808080u) - (b & 0x7f7f7f7fu);  // per byte: no borrow crosses, bit 7 tells low(a) >= low(b)
@@ -13,6 +14,7 @@ FN u32 bytes_max(u32 a, u32 b) {
   const u32 take_a = bytes_ge(a, b) * 255u;
   return (a & take_a) | (b & ~take_a);
 }
+#endif
 
 // a / b rounded to nearest, halves away from zero. Bounds: b > 0, |a| + b / 2 < 2^31.
 FN s32 divide_rounded(s32 a, s32 b) { return a >= 0 ? (a + b / 2) / b : -((b / 2 - a) / b); }

@@ -18,7 +18,26 @@ std::size_t slot_words(const std::vector<u32>& words, std::size_t width) {
   return touched;
 }
 
+std::vector<StepTraffic> traffic_of(const std::vector<Step>& steps, const std::map<const Buffer*, std::size_t>& lists) {
+  std::vector<StepTraffic> traffic;
+  for (const Step& step : steps) {
+    StepTraffic one;
+    one.op = step.op;
+    one.groups = (step.items + kGroupSize - 1) / kGroupSize;
+    for (std::size_t i = 0; i < step.buffers.size(); ++i) {
+      const auto found = lists.find(step.buffers[i]);
+      const std::size_t bytes = found != lists.end() ? found->second : step.buffers[i]->bytes();
+      (args_of(step.op)[i].read_only ? one.read : one.written) += bytes;
+      one.arguments.push_back({step.buffers[i], bytes});
+    }
+    traffic.push_back(one);
+  }
+  return traffic;
+}
+
 }  // namespace
+
+std::vector<StepTraffic> step_traffic(const std::vector<Step>& steps) { return traffic_of(steps, {}); }
 
 std::vector<StepTraffic> step_traffic(StageReader& reader) {
   std::map<const Buffer*, std::size_t> touched;
@@ -30,19 +49,7 @@ std::vector<StepTraffic> step_traffic(StageReader& reader) {
     if (stages[i].length == Stage::Length::edges) count = slot_words(words, EDGE_WORDS);
     touched[stages[i].buffer] = count * 4;
   }
-  std::vector<StepTraffic> traffic;
-  for (const Step& step : reader.plan().steps()) {
-    StepTraffic one;
-    one.op = step.op;
-    one.groups = (step.items + kGroupSize - 1) / kGroupSize;
-    for (std::size_t i = 0; i < step.buffers.size(); ++i) {
-      const auto found = touched.find(step.buffers[i]);
-      const std::size_t bytes = found != touched.end() ? found->second : step.buffers[i]->bytes();
-      (args_of(step.op)[i].read_only ? one.read : one.written) += bytes;
-    }
-    traffic.push_back(one);
-  }
-  return traffic;
+  return traffic_of(reader.plan().steps(), touched);
 }
 
 }  // namespace berth

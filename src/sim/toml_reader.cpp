@@ -40,13 +40,14 @@ TomlReader::TomlReader(std::shared_ptr<const toml::table> root, const toml::tabl
                        std::string prefix)
     : root_(std::move(root)), table_(table), file_(std::move(file)), prefix_(std::move(prefix)) {}
 
-TomlReader TomlReader::open(const std::string& path) {
+TomlReader TomlReader::open(const std::string& path, const std::string& what) {
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw Error(path + ": the scenario cannot be read; check the path and its permissions");
+  if (!stream) throw Error(path + ": the " + what + " cannot be read; check the path and its permissions");
   std::ostringstream text;
   text << stream.rdbuf();
   // A folder opens and then does not read.
-  if (stream.bad() || text.str().empty()) throw Error(path + ": the scenario is empty or not a file; name a TOML file");
+  if (stream.bad() || text.str().empty())
+    throw Error(path + ": the " + what + " is empty or not a file; name a TOML file");
   try {
     auto root = std::make_shared<const toml::table>(toml::parse(text.str(), path));
     const toml::table* table = root.get();

@@ -15,8 +15,8 @@ namespace berth::sim {
 /// "FILE:LINE: field 'table.key' is VALUE; what to do". finish() finds the keys that nobody asked for.
 class TomlReader {
  public:
-  /// Parses a file. The table lives as long as a reader of it.
-  static TomlReader open(const std::string& path);
+  /// Parses a file, which errors call `what`. The table lives as long as a reader of it.
+  static TomlReader open(const std::string& path, const std::string& what = "scenario");
 
   bool has(const std::string& key) const;
   /// The value, or the default where the key is missing. Bounds are included.
