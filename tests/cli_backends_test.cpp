@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "support/command_run.hpp"
+#include "work/machine.hpp"
 
 namespace berth {
 namespace {
@@ -35,26 +36,50 @@ TEST(CliVerify, ReportThatCannotBeWrittenIsAnError) {
 
 TEST(CliBench, TimesBackendsAndExplainsAFrame) {
   const ScratchFolder folder;
-  const std::string path = folder / "bench.json";
-  const test::CommandRun run = run_berth({"bench", "--backend", "simd,cpu", "--frames", "2", "--width", "320",
-                                          "--height", "240", "--repeat", "1", "--explain", "--json", path});
+  const std::string json = folder / "bench.json", tables = folder / "bench.md", drawing = folder / "bench.svg";
+  const test::CommandRun run =
+      run_berth({"bench",  "--backend", "simd,cpu",   "--frames",  "2",       "--width", "320",       "--height",
+                 "240",    "--repeat",  "1",          "--explain", "--modes", "docking", "--machine", "tx1",
+                 "--json", json,        "--markdown", tables,      "--svg",   drawing});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("2 frames of 320x240"));
-  EXPECT_THAT(run.out, HasSubstr(" launches"));
-  const nlohmann::json report = nlohmann::json::parse(test::text_of(path));
-  ASSERT_EQ(report.size(), 2u);
-  for (const nlohmann::json& one : report) {
-    EXPECT_GT(one.at("wall_ms").get<double>(), 0);
-    const nlohmann::json& explained = one.at("explain");
-    EXPECT_EQ(explained.at("steps").size(), explained.at("launches").get<std::size_t>());
-    EXPECT_EQ(explained.at("uploaded"), 320 * 240);
-    // Every launch takes some time and touches something.
-    for (const nlohmann::json& step : explained.at("steps")) {
-      EXPECT_GE(step.at("us").get<double>(), 0);
-      EXPECT_GT(step.at("read").get<int>() + step.at("written").get<int>(), 0) << step;
-    }
+  EXPECT_THAT(run.out, HasSubstr("NVIDIA Jetson TX1"));
+  EXPECT_THAT(run.out, HasSubstr("The same calculation was off by a factor of"));
+  EXPECT_THAT(test::text_of(tables), HasSubstr("| run_link |"));
+  EXPECT_THAT(test::text_of(drawing), HasSubstr("</svg>"));
+  const nlohmann::json report = nlohmann::json::parse(test::text_of(json));
+  ASSERT_EQ(report.at("backends").size(), 2u);
+  for (const nlohmann::json& one : report.at("backends")) EXPECT_GT(one.at("wall_ms").get<double>(), 0);
+  const nlohmann::json& explained = report.at("explain");
+  const nlohmann::json& counted = explained.at("counted").at(0);
+  EXPECT_EQ(counted.at("steps").size(), counted.at("launches").get<std::size_t>());
+  EXPECT_EQ(counted.at("uploaded"), 320 * 240);
+  for (const nlohmann::json& step : counted.at("steps")) {  // every launch touches and does something
+    EXPECT_GT(step.at("read").get<int>() + step.at("written").get<int>(), 0) << step;
+    EXPECT_GT(step.at("span").get<int>(), 0) << step;
   }
-  EXPECT_EQ(report[0].at("explain").at("read"), report[1].at("explain").at("read"));
+  ASSERT_EQ(explained.at("measured").size(), 2u);
+  for (const nlohmann::json& one : explained.at("measured")) {
+    const nlohmann::json& mode = one.at("modes").at(0);
+    EXPECT_EQ(mode.at("steps").size(), counted.at("steps").size());
+    EXPECT_GT(mode.at("frame_us").get<double>(), 0);
+    EXPECT_GT(mode.at("predicted_us").get<double>(), 0);
+  }
+  EXPECT_GT(explained.at("projected").at(0).at("modes").at(0).at("us").get<double>(), 0);
+}
+
+TEST(CliBench, DescribesThisMachine) {
+  const ScratchFolder folder;
+  const std::string path = folder / "here.toml";
+  const test::CommandRun run =
+      run_berth({"bench", "--describe-machine", path, "--backend", "cpu", "--width", "320", "--height", "240"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const work::Machine machine = work::read_machine(path);
+  EXPECT_EQ(machine.backend, "cpu");
+  EXPECT_FALSE(machine.items_in_parallel);
+  EXPECT_EQ(run_berth({"bench", "--describe-machine", path, "--backend", "cpu,simd"}).exit_code, 2);
+  EXPECT_THAT(run_berth({"bench", "--explain", "--machine", "abacus", "--frames", "1", "--repeat", "1"}).err,
+              HasSubstr("tx1, jetson-nano"));
 }
 
 TEST(CliRun, LockstepComparesEveryFrame) {

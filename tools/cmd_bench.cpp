@@ -1,19 +1,19 @@
-// berth bench: how long a docking frame takes on each backend, and where the time and the bytes go.
+// berth bench: how long a docking frame takes on each backend, where the time and the bytes go, and what that makes of
+// machines that are only described.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
-#include <sstream>
 
+#include "bench_explain.hpp"
+#include "bench_frames.hpp"
 #include "berth/error.hpp"
 #include "camera/image_file.hpp"
 #include "commands.hpp"
-#include "engine.hpp"
-#include "frame/traffic.hpp"
-#include "frame_json.hpp"
+#include "machine.hpp"
 #include "output_file.hpp"
-#include "quantile.hpp"
+#include "shared_file.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
 
@@ -23,7 +23,10 @@ namespace {
 constexpr const char* kExamples = R"(Examples:
   berth bench                                    every backend on frames of the simulated dock
   berth bench --backend simd,vulkan --image photo.png
-  berth bench --backend opencl --explain         launches, bytes and time of every operation
+  berth bench --explain                          bytes, operations and time of every operation, measured and predicted
+  berth bench --explain --machine tx1            and by calculation for a machine that is described
+  berth bench --describe-machine here.toml --backend simd   describes this one, by what it measures
+  berth bench --markdown bench.md --svg bench.svg --json bench.json
 
 Times of one run compare; those of two runs on a busy machine do not.)";
 
@@ -36,160 +39,156 @@ struct BenchCommand {
   int width = 640;
   int height = 480;
   bool explain = false;
-  std::string report;
+  std::vector<std::string> machines;
+  std::vector<std::string> modes;
+  std::string describe;
+  std::string json, markdown, svg;
 };
 
-/// The Jetson TX1 of the paper, for which --explain gives a lower bound: 25.6 GB/s of memory, and what a launch from a
-/// stream is taken to cost there. What its 256 cores at 998 MHz add in arithmetic is not in it.
-constexpr double kTx1BytesPerNs = 25.6;
-constexpr double kTx1LaunchNs = 5000;
-
-struct BenchFrame {
-  std::string name;
-  GrayImage image;
+/// Tables go to the terminal at once and into the report at the end.
+struct BenchOutput {
+  Console& console;
+  std::string markdown;
+  void show(const BenchTable& table) {
+    console.out() << aligned(table) << std::flush;
+    markdown += cli::markdown(table);
+  }
+  void show(const std::vector<BenchTable>& tables) {
+    for (const BenchTable& table : tables) show(table);
+  }
 };
 
 std::vector<BenchFrame> frames_of(const BenchCommand& command) {
   std::vector<BenchFrame> frames;
   for (const std::string& path : command.images) frames.push_back({path, read_gray_image(path)});
-  if (!frames.empty()) return frames;
-  std::unique_ptr<sim::Renderer> renderer;
-  for (int i = 0; i < command.frames; ++i) {
-    // Spread over the whole approach.
-    const sim::Scene scene =
-        sim::corpus_scene("dock", i * sim::kCorpusFrames / command.frames, command.width, command.height);
-    if (!renderer) renderer = std::make_unique<sim::Renderer>(scene.camera);
-    frames.push_back({"dock_" + std::to_string(i), renderer->render(scene)});
-  }
-  return frames;
+  return frames.empty() ? dock_frames(command.frames, command.width, command.height) : frames;
 }
 
-/// Medians over frames of the best of several runs of each, ms.
-struct Times {
-  double processor = 0, wall = 0, wall_p95 = 0, device = 0, decode = 0;
-};
+/// What machines are calibrated on: no frame that is then predicted.
+BenchFrame calibration_frame(const BenchCommand& command) {
+  const sim::Scene scene = sim::corpus_scene("cluttered", 0, command.width, command.height);
+  return {"cluttered_0", sim::Renderer(scene.camera).render(scene)};
+}
 
-Times measure(Engine& engine, const std::vector<BenchFrame>& frames, int repeat) {
-  std::vector<double> processor, wall, device, decode;
-  for (const BenchFrame& frame : frames) {
-    double best[4] = {1e9, 1e9, 1e9, 1e9};
-    for (int i = 0; i < repeat; ++i) {
-      const TimedResult timed = engine.detect(frame.image.view(), {});
-      if (timed.frame.status == FrameStatus::device_lost) throw Error(frame.name + ": the device was lost");
-      best[0] = std::min(best[0], ms_of(timed.cpu_ns));
-      best[1] = std::min(best[1], ms_of(timed.wall_ns));
-      best[2] = std::min(best[2], ms_of(timed.frame.times[0].ns));
-      best[3] = std::min(best[3], ms_of(timed.frame.times[1].ns));
+/// A description's file, or the name of one that comes with Berth.
+work::Machine machine_of(const std::string& name) {
+  const bool is_file = name.find('/') != std::string::npos || name.find(".toml") != std::string::npos;
+  return work::read_machine(is_file
+                                ? name
+                                : shared_file("bench/machines/" + name + ".toml",
+                                              "give --machine a file, or tx1, jetson-nano, orin-nano, pi5 or rk3588"));
+}
+
+EngineBackends open_one(const BenchCommand& command, const std::string& name) {
+  EngineOptions options;
+  options.backend = name;
+  options.device = command.backend.device;
+  options.threads = command.backend.threads;
+  options.fallback = "none";
+  return open_chosen_backends(options);
+}
+
+int describe_machine(const BenchCommand& command, Console& console) {
+  if (command.backends.size() > 1) {
+    throw Error("--describe-machine: " + std::to_string(command.backends.size()) +
+                " backends; name one by --backend, a description is one backend's");
+  }
+  const std::string name = command.backends.empty() ? "simd" : command.backends.front();
+  const EngineBackends opened = open_one(command, name);
+  Backend& backend = *opened.backends.front();
+  const BenchFrame frame = calibration_frame(command);
+  const work::Machine machine = work::measure_machine(backend, frame.image.view());
+  const Processor processor = this_processor();
+  const std::string remark = fmt::format(
+      "Measured by berth bench --describe-machine, backend {}, on {} ({} processors), {}.\nBandwidths by copies, rates "
+      "by "
+      "{} and a convolution; cycles of simple operations and quotients are taken.",
+      name, processor.model, processor.threads, this_system(), frame.name);
+  const std::string text = work::machine_text(machine, remark);
+  write_file(command.describe, "the description", text);
+  console.out() << text;
+  return kOk;
+}
+
+/// The table of backends; those that are not there are named where all are asked for. Returns those that were timed.
+std::vector<BackendTimes> time_backends(const BenchCommand& command, const std::vector<BenchFrame>& frames,
+                                        const std::vector<std::string>& names, BenchOutput& output) {
+  const View2D<const u8> first = frames.front().image.view();
+  std::vector<BackendTimes> all;
+  std::string absent;
+  for (const std::string& name : names) {
+    EngineBackends backends;
+    try {
+      backends = open_one(command, name);
+    } catch (const Error& error) {
+      if (!command.backends.empty()) throw;
+      absent += fmt::format("{}{}: {}", absent.empty() ? "absent: " : "; ", name, error.what());
+      continue;
     }
-    processor.push_back(best[0]);
-    wall.push_back(best[1]);
-    device.push_back(best[2]);
-    decode.push_back(best[3]);
+    DetectorConfig config;
+    config.camera = paper_camera(first.width, first.height);
+    config.marker_size_m = 0.1;
+    Engine engine(std::move(backends), config);
+    const FrameTimes times = time_frames(engine, frames, command.repeat);
+    const DeviceInfo device = engine.backend().device();
+    all.push_back({name, device.name, device.driver, times});
   }
-  return {quantile(processor, 0.5), quantile(wall, 0.5), quantile(wall, 0.95), quantile(device, 0.5),
-          quantile(decode, 0.5)};
+  BenchTable table = frame_table(fmt::format("docking mode, {} frame{} of {}x{}, {} runs each", frames.size(),
+                                             frames.size() == 1 ? "" : "s", first.width, first.height, command.repeat),
+                                 all);
+  if (!absent.empty()) table.note += "\n  " + absent;
+  output.show(table);
+  return all;
 }
 
-/// Launches, bytes and time of one frame's plan, operation by operation.
-Json explain(Backend& backend, const BenchFrame& frame, std::ostream& out) {
+Json explain(const BenchCommand& command, const std::vector<work::Machine>& machines,
+             const std::vector<BenchFrame>& frames, const std::vector<BackendTimes>& timed, BenchOutput& output) {
+  const BenchFrame& frame = frames[frames.size() / 2];
+  const ExplainedModes modes(command.modes, frame);
+  output.show(count_tables(modes));
+  const BenchFrame calibration = calibration_frame(command);
+  std::vector<MeasuredBackend> measured;
+  for (const BackendTimes& one : timed) {
+    if (one.backend == "reference") continue;  // it is not the kernel text that is counted
+    const EngineBackends opened = open_one(command, one.backend);
+    measured.push_back(measure_backend(*opened.backends.front(), calibration, modes));
+  }
   const View2D<const u8> image = frame.image.view();
-  MarkerPlan plan(backend, image.width, image.height, {});
-  const std::unique_ptr<Stream> stream = backend.make_stream();
-  std::vector<u8> padded(plan.geometry().frame_bytes());
-  pad_frame(image, plan.geometry(), padded.data());
-  stream->upload(plan.frame(), padded.data(), padded.size());
-  stream->replay(plan.plan());
-  if (!stream->finish()) throw Error(frame.name + ": the device was lost");
-  std::vector<std::int64_t> times = stream->time_steps(plan.plan());
-  for (int i = 0; i < 5 && !times.empty(); ++i) {
-    const std::vector<std::int64_t> again = stream->time_steps(plan.plan());
-    for (std::size_t k = 0; k < times.size(); ++k) times[k] = std::min(times[k], again[k]);
-  }
-  StageReader reader(plan, *stream);
-  const std::vector<StepTraffic> steps = step_traffic(reader);
-
-  std::size_t downloaded = 0;
-  for (const MarkerSearch& search : plan.searches()) {
-    downloaded += search.contours->bytes() + search.quads->bytes() + search.edges->bytes();
-  }
-  Json list = Json::array();
-  std::size_t read = 0, written = 0;
-  double time_us = 0, tx1_us = 0;
-  out << fmt::format("\n{} on {}, frame {}\n", backend.name(), backend.device().name, frame.name)
-      << fmt::format("  {:<18} {:>7} {:>10} {:>10} {:>9} {:>12}\n", "operation", "groups", "read KB", "written KB",
-                     "us", "TX1 least us");
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    const StepTraffic& step = steps[i];
-    const double bytes = static_cast<double>(step.read + step.written);
-    const double least_us = (kTx1LaunchNs + bytes / kTx1BytesPerNs) / 1e3;
-    const double us = times.empty() ? 0 : static_cast<double>(times[i]) / 1e3;
-    out << fmt::format("  {:<18} {:>7} {:>10.1f} {:>10.1f} {:>9} {:>12.1f}\n", name_of(step.op), step.groups,
-                       static_cast<double>(step.read) / 1e3, static_cast<double>(step.written) / 1e3,
-                       times.empty() ? "-" : fmt::format("{:.1f}", us), least_us);
-    list.push_back(
-        {{"operation", name_of(step.op)}, {"groups", step.groups}, {"read", step.read}, {"written", step.written}});
-    if (!times.empty()) list.back()["us"] = us;
-    read += step.read;
-    written += step.written;
-    time_us += us;
-    tx1_us += least_us;
-  }
-  out << fmt::format("  {:<18} {:>7} {:>10.1f} {:>10.1f} {:>9} {:>12.1f}\n", fmt::format("{} launches", steps.size()),
-                     "", static_cast<double>(read) / 1e3, static_cast<double>(written) / 1e3,
-                     times.empty() ? "-" : fmt::format("{:.1f}", time_us), tx1_us)
-      << fmt::format("  upload {:.1f} KB, download {:.1f} KB, device memory {:.1f} MB\n",
-                     static_cast<double>(padded.size()) / 1e3, static_cast<double>(downloaded) / 1e3,
-                     static_cast<double>(plan.device_bytes()) / 1e6)
-      << fmt::format("  TX1 least: {:.1f} GB/s and {:.0f} us a launch; arithmetic is not counted\n", kTx1BytesPerNs,
-                     kTx1LaunchNs / 1e3);
-  return {{"launches", steps.size()}, {"read", read}, {"written", written}, {"uploaded", padded.size()},
-          {"downloaded", downloaded}, {"steps", list}};
+  output.show(
+      measured_tables(modes, measured, static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)));
+  const PredictionError error = prediction_error(measured);
+  if (!machines.empty()) output.show(projection_tables(modes, machines, error));
+  output.show(paper_table(modes, measured, timed, machines));
+  Json json = {{"counted", Json::array()}, {"measured", Json::array()}, {"projected", Json::array()}};
+  for (const ExplainedMode& mode : modes.modes()) json["counted"].push_back(to_json(mode));
+  for (const MeasuredBackend& one : measured) json["measured"].push_back(to_json(one, modes));
+  for (const work::Machine& machine : machines) json["projected"].push_back(projection_json(modes, machine));
+  json["prediction"] = {{"typical_frame_factor", error.typical_frame},
+                        {"worst_frame_factor", error.worst_frame},
+                        {"typical_step_factor", error.typical_step},
+                        {"frames", error.frames}};
+  return json;
 }
 
 int run_bench(const BenchCommand& command, Console& console) {
+  if (!command.describe.empty()) return describe_machine(command, console);
+  std::vector<work::Machine> machines;  // what is wrong with a file is said before anything is measured
+  for (const std::string& name : command.machines) machines.push_back(machine_of(name));
   const std::vector<BenchFrame> frames = frames_of(command);
-  const std::vector<std::string>& names = command.backends.empty() ? backend_names() : command.backends;
-  const View2D<const u8> first = frames.front().image.view();
-  console.out() << fmt::format("docking mode, {} frame{} of {}x{}, medians of the best of {}\n", frames.size(),
-                               frames.size() == 1 ? "" : "s", first.width, first.height, command.repeat)
-                << fmt::format("{:<10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>10}  {}\n", "backend", "wall ms", "p95",
-                               "device", "decode", "cpu ms", "frames/s", "on");
-  Json report = Json::array();
-  std::ostringstream explanations;  // after the table
-  for (const std::string& name : names) {
-    EngineOptions options;
-    options.backend = name;
-    options.device = command.backend.device;
-    options.threads = command.backend.threads;
-    options.fallback = "none";
-    EngineBackends backends;
-    try {
-      backends = open_chosen_backends(options);
-    } catch (const Error& error) {
-      if (!command.backends.empty()) throw;
-      console.out() << fmt::format("{:<10} absent: {}\n", name, error.what());
-      continue;
-    }
-    Engine engine(std::move(backends), DetectorConfig{});
-    const Times times = measure(engine, frames, command.repeat);
-    console.out() << fmt::format("{:<10} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>10.0f}  {}\n", name,
-                                 times.wall, times.wall_p95, times.device, times.decode, times.processor,
-                                 1e3 / times.wall, engine.backend().device().name)
-                  << std::flush;
-    Json json = {{"backend", name},
-                 {"device", engine.backend().device().name},
-                 {"driver", engine.backend().device().driver},
-                 {"wall_ms", times.wall},
-                 {"wall_p95_ms", times.wall_p95},
-                 {"device_ms", times.device},
-                 {"decode_ms", times.decode},
-                 {"processor_ms", times.processor}};
-    if (command.explain) json["explain"] = explain(engine.backend(), frames[frames.size() / 2], explanations);
-    report.push_back(json);
+  BenchOutput output{console, ""};
+  const std::vector<BackendTimes> timed =
+      time_backends(command, frames, command.backends.empty() ? backend_names() : command.backends, output);
+  Json report = {{"processor", this_processor().model}, {"system", this_system()}, {"backends", Json::array()}};
+  for (const BackendTimes& one : timed) report["backends"].push_back(to_json(one));
+  if (command.explain) report["explain"] = explain(command, machines, frames, timed, output);
+  if (!command.json.empty()) write_file(command.json, "the report", to_line(report) + '\n');
+  if (!command.markdown.empty()) {
+    write_file(command.markdown, "the tables",
+               fmt::format("{}, {}\n{}", this_processor().model, this_system(), output.markdown));
   }
-  console.out() << explanations.str();
-  if (command.report.empty()) return kOk;
-  write_file(command.report, "the report", to_line(report) + '\n');
+  if (!command.svg.empty()) {
+    write_file(command.svg, "the drawing", frame_bars_svg("A docking frame on " + this_processor().model, timed));
+  }
   return kOk;
 }
 
@@ -198,6 +197,7 @@ int run_bench(const BenchCommand& command, Console& console) {
 void add_bench(CLI::App& app, Console& console, int& exit_code) {
   CLI::App* command = app.add_subcommand("bench", "Time a docking frame on each backend; show where its time goes");
   const auto options = std::make_shared<BenchCommand>();
+  options->modes = {"docking", "lite", "paper"};
   command->add_option("--backend", options->backends, "backend to time; may be repeated or a comma list [all]")
       ->type_name("NAME")
       ->delimiter(',')
@@ -222,8 +222,30 @@ void add_bench(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("N")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  command->add_flag("--explain", options->explain, "launches, bytes and time of every operation of one frame");
-  command->add_option("--json", options->report, "a report for machines")->type_name("FILE");
+  CLI::Option* explain =
+      command->add_flag("--explain", options->explain,
+                        "bytes, operations and time of every operation of one frame, measured and predicted");
+  command
+      ->add_option("--machine", options->machines,
+                   "a machine to calculate for: a description's file, or tx1, jetson-nano, orin-nano, pi5, rk3588; may "
+                   "be repeated or a comma list")
+      ->type_name("NAME")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->needs(explain);
+  command->add_option("--modes", options->modes, "what is explained")
+      ->type_name("NAME")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(bench_mode_names()))
+      ->capture_default_str()
+      ->needs(explain);
+  command->add_option("--describe-machine", options->describe, "measure this machine and write its description")
+      ->type_name("FILE.toml")
+      ->excludes(explain);
+  command->add_option("--json", options->json, "a report for machines")->type_name("FILE");
+  command->add_option("--markdown", options->markdown, "the tables as Markdown")->type_name("FILE");
+  command->add_option("--svg", options->svg, "a frame's time on each backend, drawn")->type_name("FILE");
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] { exit_code = run_bench(*options, console); });
 }
