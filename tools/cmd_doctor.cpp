@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/Version.hpp>
+#include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 
 #include "berth/backend.hpp"
@@ -56,6 +58,17 @@ std::vector<Remedy> remedies(const std::vector<BackendStatus>& backends, const K
   return all;
 }
 
+/// Cameras of Video4Linux by names that stay the same after a restart, as --source takes them.
+std::vector<std::string> cameras() {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev/v4l/by-path", error)) {
+    names.push_back("v4l2:by-path/" + entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 std::string compiler() {
 #if defined(__clang__)
   return "clang " __clang_version__;
@@ -77,6 +90,7 @@ Json describe() {
                  {"threads", processor.threads},
                  {"vector_extensions", processor.vector_extensions}}},
                {"backends", Json::array()},
+               {"cameras", cameras()},
                {"kernel_cache",
                 {{"path", cache.path},
                  {"exists", cache.exists},
@@ -127,6 +141,9 @@ void print(const Json& json, std::ostream& out) {
     }
     if (!backend["available"].get<bool>()) out << fmt::format("  {:<11} absent\n", name);
   }
+  out << "cameras, for --source\n";
+  for (const Json& camera : json["cameras"]) out << "  " << text_of(camera) << '\n';
+  if (json["cameras"].empty()) out << "  none in /dev/v4l/by-path\n";
   if (json["missing"].empty()) {
     out << "nothing is missing\n";
     return;

@@ -52,8 +52,9 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image or video");
   const auto options = std::make_shared<Options>();
   command
-      ->add_option("--source", options->source,
-                   "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, or a path from which that is told")
+      ->add_option(
+          "--source", options->source,
+          "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, v4l2:CAMERA (docs/cameras.md), or a path that tells")
       ->type_name("SOURCE")
       ->required();
   command->add_option("--json", options->stream.log, "log: one JSON line a frame; - for standard output")

@@ -35,7 +35,19 @@ struct SourceFrame {
   std::vector<TruthMarker> truth;
 };
 
-/// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`; cameras later.
+/// What a camera has been through since it was opened.
+struct SourceHealth {
+  /// Frames that the camera or its driver has taken and not handed over, by their sequence numbers.
+  u64 lost = 0;
+  /// Frames with data missing; they are never handed on.
+  u64 incomplete = 0;
+  /// Frames that were older than another one already there when they were to be handed on.
+  u64 skipped = 0;
+  /// Times the camera was opened again.
+  u64 reopened = 0;
+};
+
+/// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`, `v4l2:CAMERA`.
 class Source {
  public:
   virtual ~Source() = default;
@@ -43,6 +55,8 @@ class Source {
   virtual std::optional<SourceFrame> next() = 0;
   /// Frames in all, when known beforehand.
   virtual std::optional<std::size_t> size() const { return std::nullopt; }
+  /// All 0 for files.
+  virtual SourceHealth health() const { return {}; }
   /// The source's own camera, where it knows one (simulation).
   virtual std::optional<CameraModel> camera() const { return std::nullopt; }
 };

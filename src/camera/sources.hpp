@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "berth/source.hpp"
+#include "camera/v4l2_camera.hpp"
 
 namespace berth {
 
@@ -15,8 +16,16 @@ std::unique_ptr<Source> open_images(std::vector<std::string> paths);
 /// Throws Error when it cannot be opened.
 std::unique_ptr<Source> open_video(const std::string& path);
 
-/// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`. A bare path is told by what it
-/// is: a folder, a name ending in .toml, an image name, otherwise a video. Throws Error that lists what there is.
+/// A camera of Video4Linux, newest frame first: what it took while a frame was being looked at is skipped and counted.
+/// A camera that gives no frame for V4l2Options::watchdog_ms, or is gone, is complained of (Error) and opened again by
+/// its name, at most every 2 s; frames go on when it is back. Times are the driver's, clock "monotonic". The middle of
+/// the exposure is known where exposure_us is set, else it is taken for the driver's time.
+/// Throws Error when it cannot be opened the first time.
+std::unique_ptr<Source> open_v4l2(const V4l2Options& options, V4l2Opener opener = open_v4l2_device);
+
+/// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `v4l2:CAMERA`. A bare path is
+/// told by what it is: a folder, a name ending in .toml, an image name, otherwise a video. Throws Error that lists what
+/// there is.
 std::unique_ptr<Source> open_source(const std::string& spec);
 
 }  // namespace berth
