@@ -8,6 +8,7 @@
 #include "berth/backend.hpp"
 #include "berth/bundle.hpp"
 #include "berth/camera.hpp"
+#include "berth/disc_target.hpp"
 #include "berth/frame.hpp"
 #include "berth/image.hpp"
 
@@ -55,6 +56,9 @@ struct DetectorConfig {
   /// in it, whatever marker_size_m is (0 then means that others get none). No marker may be in two of them, and their
   /// families must be among `families`.
   std::vector<Bundle> bundles;
+  /// Targets of discs, each looked for once a frame; they need the camera. With them the marker size may be 0: markers
+  /// then get no pose.
+  std::vector<DiscTarget> disc_targets;
   PoseMethod pose_method = PoseMethod::least_squares;
   CornerMethod corner_method = CornerMethod::edges;
   /// One standard deviation of a corner's coordinate, px: what poses' covariances go by (docs/pose.md) where the
@@ -73,7 +77,8 @@ double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, i
 /// Finds markers in frames of one size on one backend. All memory is taken in the constructor.
 class Detector {
  public:
-  /// Throws Error on a size outside 1…16384, an unknown family, a bundle that does not hold or a bad configuration.
+  /// Throws Error on a size outside 1…16384, an unknown family, a bundle or a target that does not hold or a bad
+  /// configuration.
   Detector(Backend& backend, int width, int height, const DetectorConfig& config);
   ~Detector();
   Detector(Detector&&) noexcept;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "berth/bundle.hpp"
+#include "berth/disc_target.hpp"
 #include "berth/image.hpp"
 #include "berth/marker.hpp"
 #include "berth/types.hpp"
@@ -49,12 +50,15 @@ struct FrameResult {
   std::vector<Detection> detections;
   /// One for each of DetectorConfig::bundles, in their order.
   std::vector<BundlePose> bundles;
+  /// One for each of DetectorConfig::disc_targets, in their order.
+  std::vector<DiscPose> disc_targets;
   /// Quadrilaterals that were examined for a code.
   int quads = 0;
   /// Run ends, contours and points of each search in turn (docs/marker-pipeline.md).
   std::array<CapacityUse, 9> capacities = {};
-  /// device: upload to download; decode; pose; corners, where the photometric fit was asked for
-  std::array<StageTime, 4> times = {};
+  /// device: upload to download; decode; pose; corners, where the photometric fit was asked for; discs, where targets
+  /// of discs were
+  std::array<StageTime, 5> times = {};
   /// Filled only when the detector is asked for digests.
   std::vector<StageDigest> digests;
 };

@@ -13,6 +13,7 @@
 #include "target/bent_sides.hpp"
 #include "target/bundle_pose.hpp"
 #include "target/decode.hpp"
+#include "target/disc_finder.hpp"
 #include "target/marker_pose.hpp"
 #include "target/paper_p4p.hpp"
 #include "target/photometric_fit.hpp"
@@ -99,11 +100,16 @@ struct HostFinish::Impl {
         families(find_families(config.families)),
         decoder(families, config.max_hamming),
         bundles(bundle_posers(config.bundles, families)) {
-    if (config.camera && !(config.marker_size_m > 0) && (bundles.empty() || config.marker_size_m != 0)) {
+    const bool has_sizes = !bundles.empty() || !config.disc_targets.empty();
+    if (config.camera && !(config.marker_size_m > 0) && (!has_sizes || config.marker_size_m != 0)) {
       throw Error("marker size is " + std::to_string(config.marker_size_m) + " m; give the side that the corners span");
     }
     if (!(config.corner_deviation_px > 0)) {
       throw Error("corner_deviation_px is " + std::to_string(config.corner_deviation_px) + "; give px above 0");
+    }
+    if (!config.disc_targets.empty()) {
+      if (!config.camera) throw Error("targets of discs are asked for without a camera; give the camera's calibration");
+      discs.emplace(config.disc_targets, *config.camera);
     }
     is_bending = config.camera && (config.camera->lens != LensModel::radial_tangential ||
                                    config.camera->distortion != std::array<double, 8>{});
@@ -115,6 +121,7 @@ struct HostFinish::Impl {
     for (const SearchResult& search : frame.searches()) slots += static_cast<std::size_t>(search.capacity());
     result.detections.reserve(slots);
     result.bundles.resize(bundles.size());
+    result.disc_targets.resize(config.disc_targets.size());
     refused.reserve(slots);
   }
 
@@ -135,10 +142,15 @@ struct HostFinish::Impl {
       }
     }
     const Clock::time_point posed = Clock::now();
+    if (discs) find_discs(frame, result);
+    const Clock::time_point done = Clock::now();
     result.times = {StageTime{"device", frame.done_ns() - frame.submitted_ns()},
                     StageTime{"decode", ns_between(on_host, decoded)}, StageTime{"pose", ns_between(refined, posed)},
-                    StageTime{fit ? "corners" : "", ns_between(decoded, refined)}};
-    result.status = result.detections.empty() ? FrameStatus::no_target : FrameStatus::ok;
+                    StageTime{fit ? "corners" : "", ns_between(decoded, refined)},
+                    StageTime{discs ? "discs" : "", ns_between(posed, done)}};
+    const bool has_discs = std::any_of(result.disc_targets.begin(), result.disc_targets.end(),
+                                       [](const DiscPose& target) { return target.has_pose; });
+    result.status = result.detections.empty() && !has_discs ? FrameStatus::no_target : FrameStatus::ok;
     for (std::size_t i = 0; i < frame.searches().size(); ++i) {
       frame.searches()[i].note_capacities(&result.capacities[3 * i]);
     }
@@ -151,6 +163,7 @@ struct HostFinish::Impl {
   static void clear(FrameResult& result) {
     result.detections.clear();
     std::fill(result.bundles.begin(), result.bundles.end(), BundlePose{});
+    std::fill(result.disc_targets.begin(), result.disc_targets.end(), DiscPose{});
     result.digests.clear();
     result.quads = 0;
   }
@@ -172,6 +185,12 @@ struct HostFinish::Impl {
         refused.push_back(candidate.fine);
       }
     }
+  }
+
+  void find_discs(DeviceFrame& frame, FrameResult& result) {
+    discs->clear();
+    for (const SearchResult& search : frame.searches()) search.add_outlines(*discs);
+    discs->find(frame.image(), result.disc_targets);
   }
 
   void refine_corners(DeviceFrame& frame, FrameResult& result) {
@@ -241,6 +260,7 @@ struct HostFinish::Impl {
   Decoder decoder;
   std::vector<BundlePoser> bundles;
   std::optional<PhotometricFit> fit;
+  std::optional<DiscFinder> discs;
   bool is_bending = false;       // straight lines in the world are not straight in the image
   std::vector<Corners> refused;  // candidates of the frame that hold no marker
 };

@@ -10,10 +10,13 @@
 
 namespace berth {
 
+class DiscFinder;
+
 /// One search's results on the host: in the device's memory where the host reaches it, downloaded otherwise.
 class SearchResult {
  public:
-  explicit SearchResult(const MarkerSearch& search);
+  /// `with_points`: the contours' points too.
+  SearchResult(const MarkerSearch& search, bool with_points);
   void download(Stream& stream);
 
   /// How many slots the frame has filled, and how many there are.
@@ -21,8 +24,10 @@ class SearchResult {
   int capacity() const { return search_.geometry.max_contours; }
   /// Whether slot i holds a quadrilateral; `found` tells whether it has four corners.
   bool quad(int i, QuadCandidate& candidate, bool& found) const;
+  /// Gives the outlines of dark regions to `finder`; only where the points are there.
+  void add_outlines(DiscFinder& finder) const;
   void note_capacities(CapacityUse* use) const;
-  std::size_t host_bytes() const { return (contours_.size() + quads_.size() + edges_.size()) * 4; }
+  std::size_t host_bytes() const { return (contours_.size() + quads_.size() + edges_.size() + points_.size()) * 4; }
 
  private:
   const u32* header() const;
@@ -31,6 +36,7 @@ class SearchResult {
   std::vector<u32> contours_;
   std::vector<s32> quads_;
   std::vector<s32> edges_;
+  std::vector<u32> points_;
 };
 
 /// The device's part of a Detector: the plan, its stream, and where one frame's pixels and results lie. Several on one

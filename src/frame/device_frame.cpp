@@ -4,11 +4,13 @@
 #include "berth/error.hpp"
 #include "frame/detector_parts.hpp"
 #include "monotonic.hpp"
+#include "target/disc_finder.hpp"
 
 namespace berth {
 
-SearchResult::SearchResult(const MarkerSearch& search) : search_(search) {
+SearchResult::SearchResult(const MarkerSearch& search, bool with_points) : search_(search) {
   if (search.quads->host() != nullptr) return;
+  if (with_points) points_.resize(search.points->bytes() / 4);
   contours_.resize(search.contours->bytes() / 4);
   quads_.resize(search.quads->bytes() / 4);
   edges_.resize(search.edges->bytes() / 4);
@@ -19,6 +21,7 @@ void SearchResult::download(Stream& stream) {
   stream.download(*search_.contours, contours_.data(), contours_.size() * 4);
   stream.download(*search_.quads, quads_.data(), quads_.size() * 4);
   stream.download(*search_.edges, edges_.data(), edges_.size() * 4);
+  if (!points_.empty()) stream.download(*search_.points, points_.data(), points_.size() * 4);
 }
 
 const u32* SearchResult::header() const {
@@ -37,6 +40,15 @@ bool SearchResult::quad(int i, QuadCandidate& candidate, bool& found) const {
   return true;
 }
 
+void SearchResult::add_outlines(DiscFinder& finder) const {
+  const u32* const points = points_.empty() ? static_cast<const u32*>(search_.points->host()) : points_.data();
+  for (int i = 0; i < slots(); ++i) {
+    const u32* const record = header() + CONTOUR_HEADER + i * CONTOUR_WORDS;
+    if ((record[1] & CONTOUR_HOLE) != 0) continue;
+    finder.add_outline(points + record[3], static_cast<int>(record[1]), search_.scale);
+  }
+}
+
 void SearchResult::note_capacities(CapacityUse* use) const {
   const MarkerGeometry& g = search_.geometry;
   use[0] = {search_.capacity_names[0], header()[0], static_cast<u32>(g.max_run_ends)};
@@ -47,7 +59,7 @@ void SearchResult::note_capacities(CapacityUse* use) const {
 DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config)
     : plan_(backend, width, height, config), stream_(backend.make_stream()) {
   if (plan_.frame().host() == nullptr) staging_.resize(plan_.geometry().frame_bytes());
-  for (const MarkerSearch& search : plan_.searches()) searches_.emplace_back(search);
+  for (const MarkerSearch& search : plan_.searches()) searches_.emplace_back(search, !config.disc_targets.empty());
   if (!staging_.empty() && !warm_up()) {  // not in the first frame's time
     throw Error(std::string(backend.name()) + ": " + backend.device().name +
                 " was lost on the first, empty frame; see berth doctor, or use another backend");

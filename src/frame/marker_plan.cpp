@@ -97,9 +97,9 @@ MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorCo
   const MarkerGeometry whole(width, height, config.capacities);
   const MarkerGeometry half((width + 1) / 2, (height + 1) / 2, config.capacities);
   searches_ = {
-      {"", {{"run_ends", "contours", "points"}}, whole, 1, nullptr, nullptr, nullptr},
-      {"half_", {{"half_run_ends", "half_contours", "half_points"}}, half, 2, nullptr, nullptr, nullptr},
-      {"dark_", {{"dark_run_ends", "dark_contours", "dark_points"}}, half, 2, nullptr, nullptr, nullptr},
+      {"", {{"run_ends", "contours", "points"}}, whole, 1, nullptr, nullptr, nullptr, nullptr},
+      {"half_", {{"half_run_ends", "half_contours", "half_points"}}, half, 2, nullptr, nullptr, nullptr, nullptr},
+      {"dark_", {{"dark_run_ends", "dark_contours", "dark_points"}}, half, 2, nullptr, nullptr, nullptr, nullptr},
   };
   frame_ = buffers_.make(whole.frame_bytes() / 4);
   Buffer* pixels = config.flat_field.empty() ? frame_ : add_flat_field(config.flat_field);
@@ -169,7 +169,7 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   Buffer* cracks = buffers_.make(static_cast<std::size_t>(g.max_run_ends));
   Buffer* nodes = buffers_.make(static_cast<std::size_t>(g.max_run_ends));
   Buffer* spans = buffers_.make(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
-  Buffer* points = buffers_.make(static_cast<std::size_t>(g.max_points));
+  search.points = buffers_.make(static_cast<std::size_t>(g.max_points));
   search.contours = buffers_.make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
   search.quads = buffers_.make(contours * QUAD_WORDS);
   search.edges = buffers_.make(contours * EDGE_WORDS);
@@ -205,6 +205,7 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   for (const std::string& name : config.families) {
     (family(name).reversed_border ? measure.want_holes : measure.want_outer) = 1;
   }
+  if (!config.disc_targets.empty()) measure.want_outer = 1;
   run(measure, {nodes, offsets, spans}, g.run_groups * kGroupSize);
   run(scan_params{g.totals_at, g.run_groups}, {spans}, kGroupSize);
   run(scan_params{g.totals_at + g.run_groups + 1, g.run_groups}, {spans}, kGroupSize);
@@ -212,9 +213,9 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   run(contour_collect_params{height, row_words, base_at, g.totals_at, g.run_groups, g.max_contours, g.max_points},
       {spans, offsets, search.contours}, std::max(g.run_groups * kGroupSize, g.max_contours));
   stage("contour_collect", search.contours);
-  run(contour_trace_params{g.max_contours}, {nodes, search.contours, points}, g.max_contours);
-  stage("contour_trace", points, Stage::Length::points);
-  run(quad_fit_params{g.max_contours, kMinQuadSide, g.width, height}, {search.contours, points, search.quads},
+  run(contour_trace_params{g.max_contours}, {nodes, search.contours, search.points}, g.max_contours);
+  stage("contour_trace", search.points, Stage::Length::points);
+  run(quad_fit_params{g.max_contours, kMinQuadSide, g.width, height}, {search.contours, search.points, search.quads},
       g.max_contours * kGroupSize);
   stage("quad_fit", search.quads, Stage::Length::quads);
   run(edge_refine_params{search.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},

@@ -31,7 +31,8 @@ struct MarkerGeometry {
 };
 
 /// One search for quadrilaterals: in the whole or the halved image, thresholded at one cut. The host reads its contour
-/// header and records, its quads and its edges (kernels/ops.h).
+/// header and records, its quads and its edges, and where targets of discs are looked for the contours' points
+/// (kernels/ops.h).
 struct MarkerSearch {
   /// Before the names of its stages and capacities: "", "half_" or "dark_".
   const char* prefix;
@@ -41,6 +42,7 @@ struct MarkerSearch {
   /// Pixels of the whole image a pixel searched: 1 or 2.
   int scale;
   Buffer* contours;
+  Buffer* points;
   Buffer* quads;
   Buffer* edges;
 };

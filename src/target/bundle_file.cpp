@@ -6,11 +6,11 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <sstream>
 
 #include "berth/bundle.hpp"
 #include "berth/error.hpp"
 #include "pose_algebra.hpp"
+#include "target/file_field.hpp"
 #include "target/number_text.hpp"
 
 namespace berth {
@@ -26,77 +26,24 @@ constexpr Mat3 kWpilibFromBerth = {0, 0, -1, 1, 0, 0, 0, -1, 0};
 
 // Rounded quaternions are made whole; one further off is a mistake.
 constexpr double kUnit = 0.01;
-// Of a side or a place, m: what is beyond is in another unit.
-constexpr double kMost_m = 1000;
 constexpr const char* kFormats =
     "give a YAML file with tag_bundles as apriltag_ros has them, or a WPILib field layout in JSON";
 
-/// One value of a file and where it stands.
-class Field {
- public:
-  Field(const std::string& path, std::string name, const YAML::Node& node)
-      : path_(path), name_(std::move(name)), node_(node) {}
+int marker_id(const FileField& field) {
+  const double value = field.number();
+  if (!(std::fabs(value) < 1e9) || value != static_cast<double>(static_cast<int>(value))) {
+    field.fail("\"" + field.text() + "\" is not a marker's id", "give a whole number");
+  }
+  return static_cast<int>(value);
+}
 
-  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
-    throw Error(path_ + ": " + name_ + ": " + problem + "; " + remedy);
+const MarkerFamily& marker_family(const FileField& field) {
+  try {
+    return family(field.text());
+  } catch (const Error& error) {
+    field.fail(error.what(), "name one that Berth has");
   }
-  bool has(const std::string& key) const { return node_.IsMap() && static_cast<bool>(node_[key]); }
-  Field at(const std::string& key, const std::string& remedy) const {
-    if (!node_.IsMap()) fail("not a map", remedy);
-    Field inner(path_, name_.empty() ? key : name_ + "." + key, node_[key]);
-    if (!inner.node_) inner.fail("missing", remedy);
-    return inner;
-  }
-  std::vector<Field> items(const std::string& remedy) const {
-    if (!node_.IsSequence()) fail("not a list", remedy);
-    std::vector<Field> all;
-    for (std::size_t i = 0; i < node_.size(); ++i) {
-      all.emplace_back(path_, name_ + "[" + std::to_string(i) + "]", node_[i]);
-    }
-    return all;
-  }
-  std::string text() const {
-    if (!node_.IsScalar()) fail("not a single value", "give one value");
-    return node_.Scalar();
-  }
-  double number() const {
-    double value = 0;
-    if (!parse_decimal(text(), value)) {
-      fail("\"" + text() + "\" is not a finite number", "give a decimal number such as 0.15");
-    }
-    return value;
-  }
-  double number_or(const std::string& key, double otherwise) const {
-    return has(key) ? at(key, "").number() : otherwise;
-  }
-  double metres() const {
-    const double value = number();
-    if (!(std::fabs(value) <= kMost_m)) fail(shortest_decimal(value) + " m is out of bounds", "give metres");
-    return value;
-  }
-  double metres_or(const std::string& key, double otherwise) const {
-    return has(key) ? at(key, "").metres() : otherwise;
-  }
-  int whole() const {
-    const double value = number();
-    if (!(std::fabs(value) < 1e9) || value != static_cast<double>(static_cast<int>(value))) {
-      fail("\"" + text() + "\" is not a marker's id", "give a whole number");
-    }
-    return static_cast<int>(value);
-  }
-  const MarkerFamily& marker_family() const {
-    try {
-      return family(text());
-    } catch (const Error& error) {
-      fail(error.what(), "name one that Berth has");
-    }
-  }
-
- private:
-  const std::string& path_;
-  std::string name_;
-  YAML::Node node_;
-};
+}
 
 Mat3 rotation_of(const Quaternion& q) {
   const double s = 2 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -162,7 +109,7 @@ Quaternion settled_quaternion(const Mat3& rotation) {
   return quaternion_with(rotation_of(nearest), found) ? found : nearest;
 }
 
-Mat3 read_rotation(const Field& field, const Quaternion& q) {
+Mat3 read_rotation(const FileField& field, const Quaternion& q) {
   const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
   if (!(std::fabs(std::sqrt(square) - 1) < kUnit)) {
     field.fail("the quaternion's length is " + shortest_decimal(std::sqrt(square)),
@@ -171,15 +118,15 @@ Mat3 read_rotation(const Field& field, const Quaternion& q) {
   return rotation_of(q);
 }
 
-Bundle read_ros_bundle(const Field& field, const MarkerFamily& usual, std::size_t number) {
+Bundle read_ros_bundle(const FileField& field, const MarkerFamily& usual, std::size_t number) {
   Bundle bundle;
   bundle.name = field.has("name") ? field.at("name", "").text() : "bundle_" + std::to_string(number);
   bundle.deviation_m = field.metres_or("deviation", 0);
-  const MarkerFamily& common = field.has("family") ? field.at("family", "").marker_family() : usual;
-  for (const Field& one : field.at("layout", "list the markers").items("list the markers")) {
+  const MarkerFamily& common = field.has("family") ? marker_family(field.at("family", "")) : usual;
+  for (const FileField& one : field.at("layout", "list the markers").items("list the markers")) {
     BundleMarker marker;
-    marker.family = one.has("family") ? &one.at("family", "").marker_family() : &common;
-    marker.id = one.at("id", "give the marker's id").whole();
+    marker.family = one.has("family") ? &marker_family(one.at("family", "")) : &common;
+    marker.id = marker_id(one.at("id", "give the marker's id"));
     marker.size_m = one.at("size", "give the marker's side in metres").metres();
     const Quaternion q = {one.number_or("qw", 1), one.number_or("qx", 0), one.number_or("qy", 0),
                           one.number_or("qz", 0)};
@@ -190,7 +137,7 @@ Bundle read_ros_bundle(const Field& field, const MarkerFamily& usual, std::size_
   return bundle;
 }
 
-Bundle read_wpilib_layout(const Field& root, const std::string& path, double size_m, const MarkerFamily& usual) {
+Bundle read_wpilib_layout(const FileField& root, const std::string& path, double size_m, const MarkerFamily& usual) {
   if (!(size_m > 0)) {
     throw Error(path +
                 ": a WPILib field layout does not say how large its markers are; give their side in metres, "
@@ -198,15 +145,15 @@ Bundle read_wpilib_layout(const Field& root, const std::string& path, double siz
   }
   Bundle bundle;
   bundle.name = "field";
-  for (const Field& one : root.at("tags", "list the markers").items("list the markers")) {
-    const Field pose = one.at("pose", "give translation and rotation");
-    const Field place = pose.at("translation", "give x, y and z in metres");
-    const Field turn = pose.at("rotation", "give a quaternion").at("quaternion", "give W, X, Y and Z");
+  for (const FileField& one : root.at("tags", "list the markers").items("list the markers")) {
+    const FileField pose = one.at("pose", "give translation and rotation");
+    const FileField place = pose.at("translation", "give x, y and z in metres");
+    const FileField turn = pose.at("rotation", "give a quaternion").at("quaternion", "give W, X, Y and Z");
     const auto part = [&](const char* key) { return turn.at(key, "give W, X, Y and Z").number(); };
     const auto metres = [&](const char* key) { return place.at(key, "give x, y and z in metres").metres(); };
     BundleMarker marker;
     marker.family = &usual;
-    marker.id = one.at("ID", "give the marker's id").whole();
+    marker.id = marker_id(one.at("ID", "give the marker's id"));
     marker.size_m = size_m;
     marker.pose.R = product(read_rotation(turn, {part("W"), part("X"), part("Y"), part("Z")}), kWpilibFromBerth);
     marker.pose.t = {metres("x"), metres("y"), metres("z")};
@@ -215,28 +162,14 @@ Bundle read_wpilib_layout(const Field& root, const std::string& path, double siz
   return bundle;
 }
 
-YAML::Node load(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error(path + ": cannot read the bundle file; check the path and its permissions");
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (in.bad()) throw Error(path + ": cannot read the bundle file; is it a folder?");
-  try {
-    return YAML::Load(text.str());
-  } catch (const YAML::Exception& error) {
-    throw Error(path + ": not a YAML file (line " + std::to_string(error.mark.line + 1) + ": " + error.msg + "); " +
-                kFormats);
-  }
-}
-
 }  // namespace
 
 std::vector<Bundle> read_bundles(const std::string& path, double size_m, const std::string& family_name) {
   const MarkerFamily& usual = family(family_name);
-  const Field root(path, "", load(path));
+  const FileField root = FileField::open(path, "bundle file", kFormats);
   std::vector<Bundle> bundles;
   if (root.has("tag_bundles")) {
-    for (const Field& one : root.at("tag_bundles", "").items("list the bundles")) {
+    for (const FileField& one : root.at("tag_bundles", "").items("list the bundles")) {
       bundles.push_back(read_ros_bundle(one, usual, bundles.size()));
     }
   } else if (root.has("tags")) {

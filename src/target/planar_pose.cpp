@@ -45,10 +45,10 @@ Mat3 towards(double p, double q) {
 }
 
 // The best translation for a rotation: linear least squares of u (z + t_z) = x + t_x and the same in v.
-bool translation_for(const Mat3& R, const Corners& seen, double size_m, Vec3& t) {
-  const std::array<Vec3, 4> places = corner_places(size_m);
+bool translation_for(const Mat3& R, const Vec3* places, const Vec2* seen, std::size_t count, Vec3& t) {
+  const auto n = static_cast<double>(count);
   double su = 0, sv = 0, square = 0, rx = 0, ry = 0, rz = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     const Vec3 at = product(R, places[i]);
     const double u = seen[i][0], v = seen[i][1];
     const double eu = u * at[2] - at[0], ev = v * at[2] - at[1];
@@ -59,12 +59,12 @@ bool translation_for(const Mat3& R, const Corners& seen, double size_m, Vec3& t)
     ry += ev;
     rz -= u * eu + v * ev;
   }
-  // 4 0 -su | 0 4 -sv | -su -sv square
-  const double det = square - (su * su + sv * sv) / 4;
+  // n 0 -su | 0 n -sv | -su -sv square
+  const double det = square - (su * su + sv * sv) / n;
   if (!(det > kDegenerate)) return false;
-  t[2] = (rz + (su * rx + sv * ry) / 4) / det;
-  t[0] = (rx + su * t[2]) / 4;
-  t[1] = (ry + sv * t[2]) / 4;
+  t[2] = (rz + (su * rx + sv * ry) / n) / det;
+  t[0] = (rx + su * t[2]) / n;
+  t[1] = (ry + sv * t[2]) / n;
   return t[2] > 0;
 }
 
@@ -88,7 +88,16 @@ int planar_poses(const CameraModel& camera, double size_m, const std::array<std:
 
   // Derivative of the homography in the marker's middle, which is seen at (p, q).
   const double p = h[2], q = h[5];
-  const double j00 = h[0] - h[6] * p, j01 = h[1] - h[7] * p, j10 = h[3] - h[6] * q, j11 = h[4] - h[7] * q;
+  const std::array<Vec3, 4> places = corner_places(size_m);
+  return planar_poses({p, q}, {h[0] - h[6] * p, h[1] - h[7] * p, h[3] - h[6] * q, h[4] - h[7] * q}, places.data(),
+                      seen.data(), places.size(), poses);
+}
+
+int planar_poses(const std::array<double, 2>& origin, const std::array<double, 4>& derivative,
+                 const std::array<double, 3>* places_m, const std::array<double, 2>* seen, std::size_t count,
+                 std::array<Pose, 2>& poses) {
+  const double p = origin[0], q = origin[1];
+  const double j00 = derivative[0], j01 = derivative[1], j10 = derivative[2], j11 = derivative[3];
   const Mat3 turn = towards(p, q);
   // [I | -(p, q)] times the first two columns of `turn`, and its inverse times the derivative.
   const double b00 = turn[0] - p * turn[6], b01 = turn[1] - p * turn[7];
@@ -105,16 +114,16 @@ int planar_poses(const CameraModel& camera, double size_m, const std::array<std:
   const double b0 = std::sqrt(std::max(0.0, 1 - r00 * r00 - r10 * r10));
   const double b1 = std::sqrt(std::max(0.0, 1 - r01 * r01 - r11 * r11));
   const double sign = -(r00 * r01 + r10 * r11) < 0 ? -1 : 1;
-  int count = 0;
+  int found = 0;
   for (const double side : {1.0, -1.0}) {
     const Vec3 x = {r00, r10, side * b0}, y = {r01, r11, side * sign * b1};
     const Vec3 z = cross(x, y);
     Pose pose;
     pose.R = product(turn, Mat3{x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]});
-    if (!translation_for(pose.R, seen, size_m, pose.t)) continue;
-    poses[static_cast<std::size_t>(count++)] = pose;
+    if (!translation_for(pose.R, places_m, seen, count, pose.t)) continue;
+    poses[static_cast<std::size_t>(found++)] = pose;
   }
-  return count;
+  return found;
 }
 
 }  // namespace berth

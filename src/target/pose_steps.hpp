@@ -26,6 +26,27 @@ struct PoseNormal {
     }
     squares += residual * residual;
   }
+
+  /// The rows of two image coordinates that are `off` (px) and have this covariance (px^2: of x, of x with y, of y);
+  /// false where that is none.
+  bool add_pair(const std::array<std::array<double, 6>, 2>& rows, const Vec2& off,
+                const std::array<double, 3>& covariance_px2) {
+    squares_px += off[0] * off[0] + off[1] * off[1];
+    // Whitened by the inverse of the covariance's factor: (1/a, 0; -b/(a c), 1/c) of (a, 0; b, c).
+    const double a = std::sqrt(covariance_px2[0]), b = covariance_px2[1] / a;
+    const double rest = covariance_px2[2] - b * b;
+    if (!(a > 0) || !(rest > 0)) return false;
+    const double c = std::sqrt(rest);
+    std::array<double, 6> first{}, second{};
+    for (std::size_t i = 0; i < 6; ++i) {
+      first[i] = rows[0][i] / a;
+      second[i] = (rows[1][i] - b * first[i]) / c;
+    }
+    const double e0 = off[0] / a;
+    add_row(first, e0);
+    add_row(second, (off[1] - b * e0) / c);
+    return true;
+  }
 };
 
 /// The two rows of a corner that lies at `at` in the camera frame. `row_of` takes the derivative of an image
@@ -43,23 +64,7 @@ bool add_seen(const CameraModel& camera, const Vec3& at, const PoseCorner& corne
     const double dx = lens[2 * k] / at[2], dy = lens[2 * k + 1] / at[2];
     rows[k] = row_of(Vec3{dx, dy, -(dx * x + dy * y)});
   }
-  const Vec2 off = {corner.seen_px[0] - image[0], corner.seen_px[1] - image[1]};
-  normal.squares_px += off[0] * off[0] + off[1] * off[1];
-  // Whitened by the inverse of the covariance's factor: (1/a, 0; -b/(a c), 1/c) of (a, 0; b, c).
-  const std::array<double, 3>& cov = corner.covariance_px2;
-  const double a = std::sqrt(cov[0]), b = cov[1] / a;
-  const double rest = cov[2] - b * b;
-  if (!(a > 0) || !(rest > 0)) return false;
-  const double c = std::sqrt(rest);
-  std::array<double, 6> first{}, second{};
-  for (std::size_t i = 0; i < 6; ++i) {
-    first[i] = rows[0][i] / a;
-    second[i] = (rows[1][i] - b * first[i]) / c;
-  }
-  const double e0 = off[0] / a;
-  normal.add_row(first, e0);
-  normal.add_row(second, (off[1] - b * e0) / c);
-  return true;
+  return normal.add_pair(rows, {corner.seen_px[0] - image[0], corner.seen_px[1] - image[1]}, corner.covariance_px2);
 }
 
 /// The row of an image coordinate: its derivative by a point, where a step of the pose moves that by dt + w x arm.
