@@ -25,6 +25,13 @@ struct TruthMarker {
   double visible = 1;
 };
 
+/// A target of discs that a simulated frame shows, as it truly is.
+struct TruthTarget {
+  std::string name;
+  /// Target frame to camera frame, at mid-exposure.
+  Pose pose;
+};
+
 /// One frame of a source.
 struct SourceFrame {
   GrayImage image;
@@ -33,6 +40,7 @@ struct SourceFrame {
   std::string label;
   /// Only simulated sources know.
   std::vector<TruthMarker> truth;
+  std::vector<TruthTarget> truth_targets;
 };
 
 /// What a camera has been through since it was opened.

@@ -7,6 +7,7 @@
 #include "sim/layer.hpp"
 #include "sim/paint.hpp"
 #include "sim/printed_marker.hpp"
+#include "sim/printed_target.hpp"
 
 namespace berth::sim {
 namespace {
@@ -28,6 +29,9 @@ Drawn drawn(const Scene& scene) {
   for (const SceneMarker& marker : scene.markers) {
     for (Surface& surface : marker_surfaces(marker)) result.surfaces.push_back(std::move(surface));
     result.patterns.push_back(result.surfaces.size() - 1);
+  }
+  for (const SceneTarget& target : scene.targets) {
+    for (Surface& surface : target_surfaces(target)) result.surfaces.push_back(std::move(surface));
   }
   result.surfaces.insert(result.surfaces.end(), scene.foreground.begin(), scene.foreground.end());
   return result;
@@ -135,6 +139,12 @@ std::vector<TruthMarker> truth(const Scene& scene) {
     one.visible = in_front ? visible_share(scene, layers, all.patterns[i], side_m) : 0;
     result.push_back(one);
   }
+  return result;
+}
+
+std::vector<TruthTarget> truth_targets(const Scene& scene) {
+  std::vector<TruthTarget> result;
+  for (const SceneTarget& target : scene.targets) result.push_back({target.target.name, target.pose});
   return result;
 }
 

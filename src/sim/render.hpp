@@ -36,5 +36,7 @@ GrayImage render(const Scene& scene);
 
 /// Every marker of the scene as it truly is at mid-exposure, in the scene's order.
 std::vector<TruthMarker> truth(const Scene& scene);
+/// The same of its targets of discs.
+std::vector<TruthTarget> truth_targets(const Scene& scene);
 
 }  // namespace berth::sim

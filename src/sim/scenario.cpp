@@ -7,6 +7,7 @@
 #include "sim/body.hpp"
 #include "sim/clutter.hpp"
 #include "sim/printed_marker.hpp"
+#include "sim/printed_target.hpp"
 #include "sim/render.hpp"
 #include "sim/toml_reader.hpp"
 #include "sim/trajectory.hpp"
@@ -28,10 +29,7 @@ CameraModel read_camera(TomlReader& reader) {
     for (const char* key : {"width", "height", "fx", "fy", "cx", "cy", "distortion"}) {
       if (reader.has(key)) reader.fail(key, "remove it, or remove 'file', which already says it");
     }
-    const bool absolute = file[0] == '/';
-    const std::size_t slash = reader.file().find_last_of('/');
-    const std::string folder = absolute || slash == std::string::npos ? "" : reader.file().substr(0, slash + 1);
-    return berth::read_camera(folder + file);
+    return berth::read_camera(reader.beside(file));
   }
   if (!reader.has("fx") && !reader.has("fy")) {
     if (width * 3 != height * 4) reader.fail("height", "use a 4:3 image with the paper's lens, or give fx, fy, cx, cy");
@@ -160,9 +158,11 @@ void read_target(TomlReader& reader, u64 seed, Scene& scene) {
 
   std::vector<TomlReader> markers = reader.tables("marker");
   for (TomlReader& one : markers) scene.markers.push_back(read_marker(one));
+  std::vector<TomlReader> targets = reader.tables("disc_target");
+  for (TomlReader& one : targets) scene.targets.push_back(read_scene_target(one));
   if (reader.has("board")) {
     for (Surface& surface : read_board(reader.table("board"))) scene.background.push_back(std::move(surface));
-  } else if (markers.empty()) {
+  } else if (markers.empty() && targets.empty()) {
     add_dock_markers(scene, Pose{});
   }
 
@@ -193,6 +193,7 @@ class ScenarioSource final : public Source {
     SourceFrame frame;
     frame.image = renderer_.render(scene);
     frame.truth = truth(scene);
+    frame.truth_targets = truth_targets(scene);
     frame.label = name_ + "#" + std::to_string(index);
     const auto ns = [](double seconds) { return static_cast<std::int64_t>(floor_int(seconds * 1e9 + 0.5)); };
     frame.stamp.sequence = static_cast<u64>(index);
@@ -217,6 +218,7 @@ class ScenarioSource final : public Source {
     Scene scene = still_;
     for (Surface& surface : scene.background) surface.pose = compose(body, surface.pose);
     for (SceneMarker& marker : scene.markers) marker.pose = compose(body, marker.pose);
+    for (SceneTarget& target : scene.targets) target.pose = compose(body, target.pose);
     scene.motion = motion_between(body_at(start_s), body_at(start_s + timing_.exposure_s));
     scene.seed = scatter(still_.seed ^ scatter(static_cast<u64>(index)));
     return scene;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "berth/camera.hpp"
+#include "berth/disc_target.hpp"
 #include "berth/marker.hpp"
 #include "berth/types.hpp"
 #include "sim/geometry.hpp"
@@ -50,6 +51,16 @@ struct SceneMarker {
   /// Width of the plate's frame around the margin, m; 0 for none.
   double plate_m = 0;
   double plate_albedo = 0.45;
+  double white = 0.88, black = 0.05;
+};
+
+/// A target of discs, printed dark on a light plate.
+struct SceneTarget {
+  DiscTarget target;
+  /// Target frame to camera frame, at mid-exposure.
+  Pose pose;
+  /// Light margin around all that is printed, m.
+  double margin_m = 0.015;
   double white = 0.88, black = 0.05;
 };
 
@@ -104,13 +115,14 @@ struct Motion {
   Vec3 turn = {0, 0, 0};
 };
 
-/// A frame to render. Later surfaces hide earlier ones: background, then markers, then foreground.
+/// A frame to render. Later surfaces hide earlier ones: background, markers, targets, foreground.
 struct Scene {
   CameraModel camera;
   /// Albedo where no surface is (deep space, an open door), lit by the ambient light alone.
   double void_albedo = 0.02;
   std::vector<Surface> background;
   std::vector<SceneMarker> markers;
+  std::vector<SceneTarget> targets;
   std::vector<Surface> foreground;
   Lighting lighting;
   Sensor sensor;

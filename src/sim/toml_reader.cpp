@@ -178,4 +178,9 @@ void TomlReader::finish() const {
   throw Error(message);
 }
 
+std::string TomlReader::beside(const std::string& path) const {
+  const std::size_t slash = file_.find_last_of('/');
+  return path[0] == '/' || slash == std::string::npos ? path : file_.substr(0, slash + 1) + path;
+}
+
 }  // namespace berth::sim

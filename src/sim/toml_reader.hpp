@@ -40,6 +40,8 @@ class TomlReader {
   /// Throws the Error for a value that is wrong for another reason.
   [[noreturn]] void fail(const std::string& key, const std::string& remedy) const;
   const std::string& file() const { return file_; }
+  /// The path of a file that is named in this one, relative to it unless it is absolute.
+  std::string beside(const std::string& path) const;
 
  private:
   TomlReader(std::shared_ptr<const toml::table> root, const toml::table* table, std::string file, std::string prefix);
