@@ -93,23 +93,43 @@ double side_of(const std::array<std::array<double, 2>, 4>& corners) {
   return longest;
 }
 
-void draw_axes(Canvas& canvas, const Detection& detection, const CameraModel& camera) {
-  const Pose& pose = detection.pose;
-  // Half a side, from its size in the image: markers of one picture may differ in size.
-  const double length_m = side_of(detection.corners) / 2 * pose.t[2] / camera.fx;
-  const auto project = [&](double x, double y, double z) -> std::optional<cv::Point2d> {
-    const auto row = [&](int i) {
-      return pose.R[3 * i] * x + pose.R[3 * i + 1] * y + pose.R[3 * i + 2] * z + pose.t[i];
-    };
-    if (!(row(2) > 1e-6)) return std::nullopt;
-    return canvas.place(camera.project(row(0) / row(2), row(1) / row(2)));
-  };
+/// A point of a target in the picture; none where it lies behind the camera.
+std::optional<cv::Point2d> place_of(const Canvas& canvas, const Pose& pose, const CameraModel& camera, double x,
+                                    double y, double z) {
+  const auto row = [&](int i) { return pose.R[3 * i] * x + pose.R[3 * i + 1] * y + pose.R[3 * i + 2] * z + pose.t[i]; };
+  if (!(row(2) > 1e-6)) return std::nullopt;
+  return canvas.place(camera.project(row(0) / row(2), row(1) / row(2)));
+}
+
+void draw_axes(Canvas& canvas, const Pose& pose, double length_m, const CameraModel& camera) {
+  const auto project = [&](double x, double y, double z) { return place_of(canvas, pose, camera, x, y, z); };
   const std::optional<cv::Point2d> origin = project(0, 0, 0);
   const std::array<cv::Scalar, 3> colours = {kRed, kGreen, kBlue};
   for (int axis = 0; axis < 3; ++axis) {
     const auto end = project(axis == 0 ? length_m : 0, axis == 1 ? length_m : 0, axis == 2 ? length_m : 0);
     if (origin && end) canvas.line(*origin, *end, colours[axis]);
   }
+}
+
+void draw_target(Canvas& canvas, const DiscTarget& target, const DiscPose& found, const CameraModel& camera) {
+  constexpr int kSides = 48;
+  double reach_m = 0;
+  for (std::size_t k = 0; k < target.discs.size(); ++k) {
+    const TargetDisc& disc = target.discs[k];
+    reach_m = std::max(reach_m, std::hypot(disc.x_m, disc.y_m));
+    std::optional<cv::Point2d> before;
+    for (int i = 0; i <= kSides; ++i) {
+      const double angle = 2 * CV_PI * i / kSides, radius = disc.diameter_m / 2;
+      const std::optional<cv::Point2d> now = place_of(canvas, found.pose, camera, disc.x_m + radius * std::cos(angle),
+                                                      disc.y_m + radius * std::sin(angle), 0);
+      if (before && now) canvas.line(*before, *now, found.discs[k].seen ? kGreen : kRed);
+      before = now;
+    }
+    if (found.discs[k].seen) canvas.dot(canvas.place(found.discs[k].center_px), kYellow);
+  }
+  draw_axes(canvas, found.pose, reach_m / 2, camera);
+  const std::optional<cv::Point2d> label = place_of(canvas, found.pose, camera, 0, -reach_m, 0);
+  if (label) canvas.text(target.name, *label, canvas.text_px(), kYellow);
 }
 
 using Quad = std::array<cv::Point2d, 4>;
@@ -153,7 +173,8 @@ void draw_label(Canvas& canvas, const std::string& label, const Quad& quad, std:
 }  // namespace
 
 void write_annotated(const std::string& path, View2D<const u8> image, const std::vector<Detection>& detections,
-                     const std::optional<CameraModel>& camera) {
+                     const std::optional<CameraModel>& camera, const std::vector<DiscTarget>& targets,
+                     const std::vector<DiscPose>& found) {
   Canvas canvas(image);
   const bool one_family = std::all_of(detections.begin(), detections.end(),
                                       [&](const Detection& d) { return d.family == detections.front().family; });
@@ -169,7 +190,11 @@ void write_annotated(const std::string& path, View2D<const u8> image, const std:
     const Quad& quad = quads[d];
     for (int i = 1; i < 4; ++i) canvas.line(quad[i], quad[(i + 1) % 4], kGreen);
     canvas.line(quad[0], quad[1], kRed);
-    if (detections[d].has_pose && camera) draw_axes(canvas, detections[d], *camera);
+    if (detections[d].has_pose && camera) {
+      // Half a side, from its size in the image: markers of one picture may differ in size.
+      const Pose& pose = detections[d].pose;
+      draw_axes(canvas, pose, side_of(detections[d].corners) / 2 * pose.t[2] / camera->fx, *camera);
+    }
     canvas.dot(quad[0], kRed);
   }
   for (std::size_t d = 0; d < quads.size(); ++d) {
@@ -183,6 +208,9 @@ void write_annotated(const std::string& path, View2D<const u8> image, const std:
     }
     const std::string family = one_family ? "id" : detections[d].family->name;
     draw_label(canvas, family + " " + std::to_string(detections[d].id), quad, taken);
+  }
+  for (std::size_t i = 0; camera && i < found.size(); ++i) {
+    if (found[i].has_pose) draw_target(canvas, targets[i], found[i], *camera);
   }
   if (one_family && !detections.empty()) canvas.caption(detections[0].family->name);
   write_png(path, "the annotated picture", canvas.picture());

@@ -14,6 +14,7 @@
 #include "commands.hpp"
 #include "engine.hpp"
 #include "frame_json.hpp"
+#include "target_show.hpp"
 
 namespace berth::cli {
 namespace {
@@ -26,6 +27,7 @@ constexpr const char* kExamples = R"(Examples:
   berth detect --family tag36h11,aruco4x4_50 --draw seen.png photo.jpg
   berth detect --camera cam.yaml --size 0.08 --draw annotated/ photos/
   berth detect --camera cam.yaml --bundle dock.yaml photos/
+  berth detect --camera cam.yaml --target targets/port.yaml photos/
 
 Corners start at the upper left of the upright marker and go counter-clockwise; pixel centres lie at integers.)";
 
@@ -92,8 +94,7 @@ class DrawTarget {
   std::set<std::string> used_;
 };
 
-void print_table(Console& console, const std::string& image, const TimedResult& result,
-                 const std::vector<Bundle>& bundles) {
+void print_table(Console& console, const std::string& image, const TimedResult& result, const DetectorConfig& config) {
   const std::vector<Detection>& detections = result.frame.detections;
   console.out() << fmt::format("{}: {} marker{}, {:.3f} ms\n", image, detections.size(),
                                detections.size() == 1 ? "" : "s", ms_of(result.cpu_ns));
@@ -107,8 +108,11 @@ void print_table(Console& console, const std::string& image, const TimedResult& 
     }
     console.out() << '\n';
   }
-  for (std::size_t i = 0; i < bundles.size(); ++i) {
-    console.out() << "  " << describe(bundles[i].name, result.frame.bundles[i]) << '\n';
+  for (std::size_t i = 0; i < config.bundles.size(); ++i) {
+    console.out() << "  " << describe(config.bundles[i].name, result.frame.bundles[i]) << '\n';
+  }
+  for (std::size_t i = 0; i < result.frame.disc_targets.size(); ++i) {
+    console.out() << "  " << describe(config.disc_targets[i], result.frame.disc_targets[i]) << '\n';
   }
 }
 
@@ -133,21 +137,24 @@ void detect_one(const std::string& path, const DetectOptions& options, Engine& e
     Json line = {{"image", path}, {"ms", ms_of(result.cpu_ns)}, {"detections", to_json(result.frame.detections)}};
     const std::vector<Bundle>& bundles = engine.config().bundles;
     if (!bundles.empty()) line["bundles"] = to_json(result.frame.bundles, bundles);
+    const std::vector<DiscPose>& targets = result.frame.disc_targets;
+    if (!targets.empty()) line["targets"] = to_json(targets, engine.config().disc_targets);
     console.out() << to_line(line) << '\n';
   } else {
-    print_table(console, path, result, engine.config().bundles);
+    print_table(console, path, result, engine.config());
   }
   const std::string refusal = engine.pose_refusal(image.width(), image.height());
   if (!refusal.empty()) console.complain(path + ": " + refusal + " (" + options.engine.camera_file + ")");
   if (draw.wanted()) {
     write_annotated(draw.path_for(path), image.view(), result.frame.detections,
-                    engine.camera_for(image.width(), image.height()));
+                    engine.camera_for(image.width(), image.height()), engine.config().disc_targets,
+                    result.frame.disc_targets);
   }
 }
 
 void run_detect(const DetectOptions& options, Console& console) {
   DetectorConfig config = make_config(options.engine);
-  const bool has_sizes = !options.engine.size.empty() || !config.bundles.empty();
+  const bool has_sizes = wants_poses(config);
   if (options.engine.camera_file.empty() == has_sizes) {
     console.note(std::string("no poses: ") + (has_sizes ? "--camera" : "--size") + " is missing");
   }

@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "output_file.hpp"
 #include "tag_sheet.hpp"
+#include "target_sheet.hpp"
 
 namespace berth::cli {
 namespace {
@@ -18,6 +19,7 @@ constexpr const char* kExamples = R"(Examples:
   berth print-tag tagStandard41h12 0 --size 0.03 --grid 4x5 --out sheet.svg
   berth print-tag aruco4x4_50 3 --size 0.2 --paper a3 --out tag.pdf
   berth print-tag --bundle bundles/nested.yaml --paper a3 --out board.pdf
+  berth print-tag --target targets/port.yaml --out port.pdf
 
 --size is the side of the square that the corners span, the one to give to --size of detect and run; a ruler on the page
 shows whether the printer kept to it.)";
@@ -28,6 +30,7 @@ struct PrintCommand {
   std::string paper = "a4";
   std::string out;
   std::string bundle;
+  std::string target;
   int id = 0;
   double size_m = 0;
   double gap_m = 0;
@@ -75,13 +78,17 @@ TagSheet sheet_of(const PrintCommand& command) {
 int print_tag(const PrintCommand& command, Console& console) {
   const bool pdf = ends_with(command.out, ".pdf");
   if (!pdf && !ends_with(command.out, ".svg")) throw Error("--out '" + command.out + "': name a .pdf or .svg file");
-  if (command.bundle.empty() && (command.family.empty() || !(command.size_m > 0))) {
-    throw Error("print-tag needs FAMILY, ID and --size, or --bundle FILE; see berth print-tag --help");
-  }
-  if (!command.bundle.empty() &&
-      (!command.family.empty() || command.size_m > 0 || command.grid != "1x1" || command.gap_m > 0)) {
+  const bool from_file = !command.bundle.empty() || !command.target.empty();
+  if (!from_file && (command.family.empty() || !(command.size_m > 0))) {
     throw Error(
-        "--bundle says itself which markers, where and how large; leave FAMILY, ID, --size, --grid and --gap out");
+        "print-tag needs FAMILY, ID and --size, or --bundle FILE, or --target FILE; see berth print-tag --help");
+  }
+  if (!command.bundle.empty() && !command.target.empty()) {
+    throw Error("--bundle and --target go on pages of their own; give one of them");
+  }
+  if (from_file && (!command.family.empty() || command.size_m > 0 || command.grid != "1x1" || command.gap_m > 0)) {
+    throw Error(std::string(command.bundle.empty() ? "--target" : "--bundle") +
+                " says itself what, where and how large; leave FAMILY, ID, --size, --grid and --gap out");
   }
   const TagSheet sheet = sheet_of(command);
   if (!command.bundle.empty()) {
@@ -91,6 +98,14 @@ int print_tag(const PrintCommand& command, Console& console) {
     write_file(command.out, "the page", pdf ? page.pdf() : page.svg());
     console.out() << fmt::format("{}: bundle {}, {} markers; print at 100 % and check the ruler\n", command.out,
                                  bundles[0].name, bundles[0].markers.size());
+    return kOk;
+  }
+  if (!command.target.empty()) {
+    const DiscTarget target = read_disc_target(command.target);
+    const PrintPage page = draw_target(target, sheet.width_mm, sheet.height_mm);
+    write_file(command.out, "the page", pdf ? page.pdf() : page.svg());
+    console.out() << fmt::format("{}: target {}, {} discs; print at 100 % and check the ruler\n", command.out,
+                                 target.name, target.discs.size());
     return kOk;
   }
   const PrintPage page = draw_sheet(sheet);
@@ -103,7 +118,7 @@ int print_tag(const PrintCommand& command, Console& console) {
 }  // namespace
 
 void add_print_tag(CLI::App& app, Console& console, int& exit_code) {
-  CLI::App* command = app.add_subcommand("print-tag", "Markers on paper, at true size, as PDF or SVG");
+  CLI::App* command = app.add_subcommand("print-tag", "Markers and targets on paper, at true size, as PDF or SVG");
   const auto options = std::make_shared<PrintCommand>();
   command->add_option("family", options->family, "marker family")->type_name("FAMILY");
   command->add_option("id", options->id, "marker, or the first of a grid")->type_name("ID");
@@ -112,6 +127,7 @@ void add_print_tag(CLI::App& app, Console& console, int& exit_code) {
       ->check(CLI::Range(0.001, 10.0));
   command->add_option("--bundle", options->bundle, "instead: the flat bundle of a file, every marker in its place")
       ->type_name("FILE");
+  command->add_option("--target", options->target, "instead: the target of discs of a file")->type_name("FILE");
   command->add_option("--out", options->out, "a .pdf or .svg file")->type_name("FILE")->required();
   command->add_option("--grid", options->grid, "columns x rows of consecutive ids")->capture_default_str();
   command->add_option("--gap", options->gap_m, "between neighbouring squares, metres [two modules of white]")

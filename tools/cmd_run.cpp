@@ -14,6 +14,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source dir:recording/ --json - | jq .detections
   berth run --source sim:scenarios/approach.toml --filter --json log.jsonl
   berth run --source sim:scenarios/approach.toml --bundle bundles/approach.yaml
+  berth run --source sim:scenarios/port.toml --target targets/port.yaml
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops

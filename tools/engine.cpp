@@ -79,6 +79,11 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
           "markers are of --size; may be repeated")
       ->type_name("FILE")
       ->allow_extra_args(false);
+  command
+      .add_option("--target", options.target_files,
+                  "a target of discs or rings, looked for with --camera: a YAML file; may be repeated")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
   command.add_option("--pose", options.pose, "how poses are had: least-squares, or the paper's closed form")
       ->check(CLI::IsMember({"least-squares", "paper"}))
       ->capture_default_str();
@@ -226,10 +231,15 @@ DetectorConfig make_config(const EngineOptions& options) {
   config.max_hamming = options.max_hamming;
   if (!options.size.empty()) config.marker_size_m = parse_size(options.size);
   add_bundles(options, config);
+  for (const std::string& file : options.target_files) config.disc_targets.push_back(read_disc_target(file));
   if (options.pose == "paper") config.pose_method = PoseMethod::paper;
   config.corner_method = corner_method(options);
   if (!options.camera_file.empty()) config.camera = read_camera(options.camera_file);
   return config;
+}
+
+bool wants_poses(const DetectorConfig& config) {
+  return config.marker_size_m > 0 || !config.bundles.empty() || !config.disc_targets.empty();
 }
 
 Engine::Engine(EngineBackends backends, DetectorConfig config, CameraFit fit)
@@ -243,8 +253,7 @@ std::string Engine::describe() const {
 }
 
 std::string Engine::pose_refusal(int width, int height) const {
-  if (!config_.camera || (!(config_.marker_size_m > 0) && config_.bundles.empty()) || camera_for(width, height))
-    return "";
+  if (!config_.camera || !wants_poses(config_) || camera_for(width, height)) return "";
   const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
   return "field 'size' is " + size(width, height) + ", but the camera file's image is " +
          size(config_.camera->width, config_.camera->height) +
@@ -270,8 +279,11 @@ std::optional<CameraModel> Engine::camera_for(int width, int height) const {
 DetectorConfig Engine::config_for(int width, int height) const {
   DetectorConfig config = config_;
   config.camera = camera_for(width, height);
-  if (!(config.marker_size_m > 0) && config.bundles.empty()) config.camera.reset();
-  if (!config.camera) config.marker_size_m = 0;
+  if (!wants_poses(config)) config.camera.reset();
+  if (!config.camera) {
+    config.marker_size_m = 0;
+    config.disc_targets.clear();
+  }
   return config;
 }
 

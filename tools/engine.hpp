@@ -23,6 +23,8 @@ struct EngineOptions {
   std::string size;
   /// Files of bundles.
   std::vector<std::string> bundle_files;
+  /// Files of targets of discs.
+  std::vector<std::string> target_files;
   std::string pose = "least-squares";
   std::string corners = "edges";
   std::string backend;
@@ -43,7 +45,7 @@ struct EngineBackends {
 
 /// --backend, --device, --threads
 void add_backend_options(CLI::App& command, EngineOptions& options);
-/// The above and --family, --camera, --size, --bundle, --max-hamming
+/// The above and --family, --camera, --size, --bundle, --target, --max-hamming
 void add_engine_options(CLI::App& command, EngineOptions& options);
 
 /// --corners
@@ -59,6 +61,9 @@ EngineBackends open_chosen_backends(const EngineOptions& options);
 /// Checks every value, reads the files named, and adds the bundles' families to those looked for; throws Error that
 /// names the field, its value and the remedy.
 DetectorConfig make_config(const EngineOptions& options);
+
+/// Whether there is anything that a camera would give a pose: a size, a bundle or a target.
+bool wants_poses(const DetectorConfig& config);
 
 /// Metres as typed after `option`. Throws Error with that remedy unless it is a finite number above 0 and at most 1000.
 double parse_metres(const char* option, const std::string& text,

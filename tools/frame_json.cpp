@@ -54,6 +54,25 @@ Json to_json(const std::vector<BundlePose>& poses, const std::vector<Bundle>& bu
   return json;
 }
 
+Json to_json(const std::vector<DiscPose>& poses, const std::vector<DiscTarget>& targets) {
+  Json json = Json::array();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const DiscPose& pose = poses[i];
+    json.push_back({{"name", targets[i].name}, {"used", pose.used}});
+    if (!pose.has_pose) continue;
+    json.back()["pose"] = to_json(pose.pose);
+    add_uncertainty(pose.uncertainty, json.back()["pose"]);
+    for (std::size_t k = 0; k < targets[i].discs.size(); ++k) {
+      const DiscSight& disc = pose.discs[k];
+      json.back()["discs"].push_back(
+          disc.seen ? Json({{"center", disc.center_px}, {"covariance_px2", disc.covariance_px2}}) : Json());
+    }
+  }
+  return json;
+}
+
+Json to_json(const TruthTarget& target) { return {{"name", target.name}, {"pose", to_json(target.pose)}}; }
+
 Json to_json(const TruthMarker& marker) {
   return {{"family", marker.family},   {"id", marker.id},           {"size", marker.size_m},
           {"visible", marker.visible}, {"corners", marker.corners}, {"pose", to_json(marker.pose)}};

@@ -18,6 +18,11 @@ Json to_json(const TruthMarker& marker);
 /// Of every bundle that was asked for: name, how many of its markers went into the pose, the pose where there is one.
 Json to_json(const std::vector<BundlePose>& poses, const std::vector<Bundle>& bundles);
 
+/// Of every target of discs that was looked for: name, how many discs went into the pose, the pose where there is one,
+/// and where each disc was seen.
+Json to_json(const std::vector<DiscPose>& poses, const std::vector<DiscTarget>& targets);
+Json to_json(const TruthTarget& target);
+
 /// One frame of a stream's log. `label` names the frame in its source; truth and digests only where there are any.
 Json to_json(const FrameResult& frame, const std::string& label, std::int64_t cpu_ns,
              const std::vector<TruthMarker>& truth);

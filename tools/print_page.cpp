@@ -31,6 +31,10 @@ std::string PrintPage::svg() const {
                        r.height);
   }
   out += "</g>\n";
+  for (const Disc& d : discs_) {
+    out += fmt::format("<circle cx=\"{:.4f}\" cy=\"{:.4f}\" r=\"{:.4f}\"{}/>\n", d.x, d.y, d.radius,
+                       d.light ? " fill=\"#fff\"" : "");
+  }
   for (const Line& l : lines_) {
     out += fmt::format(
         "<line x1=\"{:.4f}\" y1=\"{:.4f}\" x2=\"{:.4f}\" y2=\"{:.4f}\" stroke=\"#000\" stroke-width=\"{:.4f}\"/>\n",
@@ -49,6 +53,20 @@ std::string PrintPage::pdf() const {
   std::string content = fmt::format("{0:.8f} 0 0 -{0:.8f} 0 {1:.4f} cm\n", 1 / kPoint_mm, height_ / kPoint_mm);
   for (const Rectangle& r : rectangles_) {
     content += fmt::format("{:.4f} {:.4f} {:.4f} {:.4f} re f\n", r.x, r.y, r.width, r.height);
+  }
+  for (const Disc& d : discs_) {
+    // Four of Bezier's cubics: off the circle by 0.0003 of its radius at most.
+    constexpr double kHandle = 0.5522847498;
+    const double r = d.radius, h = kHandle * r;
+    content += fmt::format("{} g {:.4f} {:.4f} m", d.light ? 1 : 0, d.x + r, d.y);
+    const double turns[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+    for (int i = 0; i < 4; ++i) {
+      const double ax = turns[i][0], ay = turns[i][1], bx = turns[(i + 1) % 4][0], by = turns[(i + 1) % 4][1];
+      content +=
+          fmt::format(" {:.4f} {:.4f} {:.4f} {:.4f} {:.4f} {:.4f} c", d.x + r * ax + h * bx, d.y + r * ay + h * by,
+                      d.x + r * bx + h * ax, d.y + r * by + h * ay, d.x + r * bx, d.y + r * by);
+    }
+    content += " f 0 g\n";
   }
   for (const Line& l : lines_) {
     content += fmt::format("{:.4f} w {:.4f} {:.4f} m {:.4f} {:.4f} l S\n", l.width, l.x0, l.y0, l.x1, l.y1);

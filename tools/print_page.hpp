@@ -15,6 +15,8 @@ class PrintPage {
   PrintPage(double width_mm, double height_mm) : width_(width_mm), height_(height_mm) {}
 
   void rectangle(double x, double y, double width, double height) { rectangles_.push_back({x, y, width, height}); }
+  /// A disc about (x, y), light where it is the hole of a ring; later ones cover earlier ones.
+  void disc(double x, double y, double radius, bool light = false) { discs_.push_back({x, y, radius, light}); }
   void line(double x0, double y0, double x1, double y1, double width = 0.2) {
     lines_.push_back({x0, y0, x1, y1, width});
   }
@@ -34,8 +36,14 @@ class PrintPage {
     std::string words;
   };
 
+  struct Disc {
+    double x, y, radius;
+    bool light;
+  };
+
   double width_, height_;
   std::vector<Rectangle> rectangles_;
+  std::vector<Disc> discs_;
   std::vector<Line> lines_;
   std::vector<Text> texts_;
 };

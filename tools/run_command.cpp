@@ -15,6 +15,7 @@ constexpr const char* kExamples = R"(Examples:
   berth detect --json --family tag36h11 photos/  the same for a folder, as JSON lines
   berth flight                                   from 6 m to the docked marker, with the network
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08
+  berth run --source sim:scenarios/port.toml --target targets/port.yaml   discs and rings
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
   berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target

@@ -18,6 +18,7 @@
 #include "marker_filters.hpp"
 #include "output_file.hpp"
 #include "source_arguments.hpp"
+#include "target_show.hpp"
 #include "trajectory_svg.hpp"
 #include "truth_score.hpp"
 
@@ -112,7 +113,7 @@ class StreamRun {
     size_given_ = config.marker_size_m > 0;
     // With sizes known by marker, poses are computed for one metre and scaled: t is proportional to the size.
     if (!size_given_ && !frame.truth.empty()) config.marker_size_m = 1;
-    const bool has_sizes = size_given_ || !config.bundles.empty();
+    const bool has_sizes = size_given_ || !config.bundles.empty() || !config.disc_targets.empty();
     if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
     if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
@@ -149,13 +150,16 @@ class StreamRun {
     scale_poses(result.detections, frame.truth);
     if (options_.filter) filter(frame, result, first_round);
     ++frames_;
-    frames_with_markers_ += result.detections.empty() ? 0 : 1;
+    frames_with_markers_ += result.detections.empty() && !any_found(result.disc_targets) ? 0 : 1;
     overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
     if (!options_.log.empty()) {
       Json line = to_json(result, frame.label, cpu_ns, frame.truth);
       if (paced != nullptr) add_times(*paced, line);
       const std::vector<Bundle>& bundles = engine_->config().bundles;
       if (!bundles.empty()) line["bundles"] = to_json(result.bundles, bundles);
+      const std::vector<DiscTarget>& targets = engine_->config().disc_targets;
+      if (!result.disc_targets.empty()) line["targets"] = to_json(result.disc_targets, targets);
+      for (const TruthTarget& target : frame.truth_targets) line["truth_targets"].push_back(to_json(target));
       if (options_.filter) line["filtered"] = filters_.to_json();
       log() << to_line(line) << '\n';
     }
@@ -164,6 +168,7 @@ class StreamRun {
       score_bundles(result, frame.truth);
       has_truth_ = true;
     }
+    if (first_round) score_targets(result, frame.truth_targets);
     if (!options_.svg.empty() && first_round) remember_ways(result.detections, frame.truth);
     if (!options_.picture.empty() && !result.detections.empty() &&
         result.detections.size() >= picture_detections_.size()) {
@@ -227,7 +232,19 @@ class StreamRun {
       const Bundle& bundle = engine_->config().bundles[i];
       Pose true_pose;
       if (!truth_of(bundle, truth, true_pose)) continue;
-      score_.add_bundle(bundle.name, result.bundles[i].has_pose ? &result.bundles[i].pose : nullptr, true_pose);
+      score_.add_body("bundle " + bundle.name, result.bundles[i].has_pose ? &result.bundles[i].pose : nullptr,
+                      true_pose);
+    }
+  }
+
+  void score_targets(const FrameResult& result, const std::vector<TruthTarget>& truth) {
+    for (std::size_t i = 0; i < result.disc_targets.size(); ++i) {
+      const DiscTarget& target = engine_->config().disc_targets[i];
+      const TruthTarget* known = truth_of(target, truth);
+      if (known == nullptr) continue;
+      const DiscPose& found = result.disc_targets[i];
+      score_.add_body("target " + target.name, found.has_pose ? &found.pose : nullptr, known->pose);
+      has_truth_ = true;
     }
   }
 
@@ -265,6 +282,9 @@ class StreamRun {
     }
     for (std::size_t i = 0; i < result.bundles.size(); ++i) {
       table.push_back("  " + describe(engine_->config().bundles[i].name, result.bundles[i]));
+    }
+    for (std::size_t i = 0; i < result.disc_targets.size(); ++i) {
+      table.push_back("  " + describe(engine_->config().disc_targets[i], result.disc_targets[i]));
     }
     view_.show(frames_, line, table, brief);
   }

@@ -7,15 +7,11 @@
 
 #include "berth/error.hpp"
 #include "pose_algebra.hpp"
+#include "print_aids.hpp"
 #include "target/marker_pattern.hpp"
 
 namespace berth::cli {
 namespace {
-
-constexpr double kMargin_mm = 8;
-// Below the markers: dimension line, words and ruler.
-constexpr double kFooter_mm = 30;
-constexpr double kRuler_mm = 100;
 
 /// Dark modules as one rectangle a run, row by row.
 void draw_marker(const TagSheet& sheet, int id, double left, double top, PrintPage& page) {
@@ -30,30 +26,6 @@ void draw_marker(const TagSheet& sheet, int id, double left, double top, PrintPa
       if (row[from] == 0) page.rectangle(left + from * module, top + y * module, (x - from) * module, module);
     }
   }
-}
-
-void arrow(PrintPage& page, double x, double y, double dx, double dy, const char* name) {
-  constexpr double kLength = 6, kHead = 1.2;
-  const double tip_x = x + kLength * dx, tip_y = y + kLength * dy;
-  page.line(x, y, tip_x, tip_y, 0.3);
-  page.line(tip_x, tip_y, tip_x - kHead * (dx + dy), tip_y - kHead * (dy + dx), 0.3);
-  page.line(tip_x, tip_y, tip_x - kHead * (dx - dy), tip_y - kHead * (dy - dx), 0.3);
-  page.text(tip_x + 0.8 * dx + 0.6 * dy, tip_y + 0.9 * dx + 3.2 * dy, 3, name);
-}
-
-void dimension(PrintPage& page, double x0, double x1, double y, const std::string& words) {
-  page.line(x0, y, x1, y);
-  for (const double x : {x0, x1}) page.line(x, y - 1.5, x, y + 1.5);
-  page.text(x0 + 1, y + 3.6, 3, words);
-}
-
-void ruler(PrintPage& page, double left, double top) {
-  page.line(left, top, left + kRuler_mm, top);
-  for (int mm = 0; mm <= static_cast<int>(kRuler_mm); ++mm) {
-    page.line(left + mm, top, left + mm, top + (mm % 10 == 0 ? 4 : mm % 5 == 0 ? 3 : 2), mm % 10 == 0 ? 0.25 : 0.12);
-  }
-  page.text(left, top + 7.5, 2.6,
-            "100 mm. If it is not, the printer scaled: measure the marker's side and give Berth that.");
 }
 
 }  // namespace

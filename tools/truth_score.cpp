@@ -80,8 +80,8 @@ void TruthScore::add(const std::vector<TruthMarker>& truth, const std::vector<De
   }
 }
 
-void TruthScore::add_bundle(const std::string& name, const Pose* pose, const Pose& truth) {
-  BundleScore& score = bundles_[name];
+void TruthScore::add_body(const std::string& label, const Pose* pose, const Pose& truth) {
+  BodyScore& score = bodies_[label];
   ++score.frames;
   if (pose == nullptr) return;
   const double off_m = distance_m(*pose, truth);
@@ -107,8 +107,8 @@ void TruthScore::print(std::ostream& out) const {
         pair(score.corner_px, 3), pair(score.position_mm, 2), pair(score.position_percent, 3),
         pair(score.rotation_deg, 3));
   }
-  for (const auto& [name, score] : bundles_) {
-    out << fmt::format("  {:<22} {:>5} {:>13} {:>15} {:>17} {:>15} {:>17}\n", "bundle " + name, "",
+  for (const auto& [label, score] : bodies_) {
+    out << fmt::format("  {:<22} {:>5} {:>13} {:>15} {:>17} {:>15} {:>17}\n", label, "",
                        fmt::format("{}/{}", score.position_mm.size(), score.frames), "", pair(score.position_mm, 2),
                        pair(score.position_percent, 3), pair(score.rotation_deg, 3));
   }

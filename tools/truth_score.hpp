@@ -20,8 +20,8 @@ struct MarkerScore {
   std::vector<double> corner_px, position_mm, position_percent, rotation_deg;
 };
 
-/// One bundle of a simulated stream, frame by frame in which it had a pose.
-struct BundleScore {
+/// One bundle or target of discs of a simulated stream, frame by frame in which it had a pose.
+struct BodyScore {
   int frames = 0;
   std::vector<double> position_mm, position_percent, rotation_deg;
 };
@@ -31,19 +31,19 @@ class TruthScore {
  public:
   void add(const std::vector<TruthMarker>& truth, const std::vector<Detection>& detections);
 
-  /// A frame's pose of a bundle and what it truly is; null where there was no pose.
-  void add_bundle(const std::string& name, const Pose* pose, const Pose& truth);
+  /// A frame's pose of a bundle or a target of discs ("bundle dock") and what it truly is; null where there was none.
+  void add_body(const std::string& label, const Pose* pose, const Pose& truth);
 
   /// By family and id.
   const std::map<std::pair<std::string, int>, MarkerScore>& markers() const { return markers_; }
   /// Detections of markers that the frame did not show.
   int false_positives() const { return false_positives_; }
-  /// The table: a row a marker, then a row a bundle; medians and maxima.
+  /// The table: a row a marker, then a row a bundle or a target; medians and maxima.
   void print(std::ostream& out) const;
 
  private:
   std::map<std::pair<std::string, int>, MarkerScore> markers_;
-  std::map<std::string, BundleScore> bundles_;
+  std::map<std::string, BodyScore> bodies_;
   int false_positives_ = 0;
 };
 
