@@ -46,7 +46,7 @@ class StreamRun {
 
   StreamSum run() {
     const InterruptWatch interrupt;
-    if (options_.pace.fps > 0) {
+    if (options_.pace.fps != 0) {
       play(interrupt);
       return {frames_, frames_with_markers_, differing_};
     }

@@ -47,6 +47,7 @@ void* libc_calloc(std::size_t items, std::size_t bytes) __asm__("__libc_calloc")
 void* libc_realloc(void* memory, std::size_t bytes) __asm__("__libc_realloc");
 void* libc_memalign(std::size_t alignment, std::size_t bytes) __asm__("__libc_memalign");
 
+// NOLINTBEGIN(readability-inconsistent-declaration-parameter-name): stdlib.h's are reserved
 void* malloc(std::size_t bytes) {
   ++count;
   return libc_malloc(bytes);
@@ -67,6 +68,7 @@ int posix_memalign(void** memory, std::size_t alignment, std::size_t bytes) {
   *memory = aligned_alloc(alignment, bytes);
   return *memory == nullptr ? ENOMEM : 0;
 }
+// NOLINTEND(readability-inconsistent-declaration-parameter-name)
 }
 
 #endif
