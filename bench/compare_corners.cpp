@@ -106,9 +106,10 @@ class Bench {
     for (const Detection& d : detector.detect(image.view()).detections) {
       edges.push_back({d.id, d.corners});
       Corners corners = d.corners;
+      CornerCovariance known;
       CornerFit how;
       const double start = ms_on(CLOCK_THREAD_CPUTIME_ID);
-      row.fitted += fit.refine(image.view(), *d.family, d.id, corners, how) ? 1 : 0;
+      row.fitted += fit.refine(image.view(), *d.family, d.id, corners, known, how) ? 1 : 0;
       row.fit_ms += ms_on(CLOCK_THREAD_CPUTIME_ID) - start;
       ++row.markers;
       photometric.push_back({d.id, corners});

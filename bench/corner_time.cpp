@@ -38,9 +38,10 @@ class Frame {
 
   void time_fit() {
     Corners corners = detection_.corners;
+    CornerCovariance known;
     CornerFit fit;
     const double start = us();
-    fit_.refine(image_.view(), *detection_.family, detection_.id, corners, fit);
+    fit_.refine(image_.view(), *detection_.family, detection_.id, corners, known, fit);
     fit_us_ = std::min(fit_us_, us() - start);
   }
   void time_apriltag(apriltag_detector_t* detector, bool refine) {

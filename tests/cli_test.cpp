@@ -143,7 +143,9 @@ TEST(Detect, PhotometricCornersComeWithTheirCovariance) {
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   const json marker = fitted.lines().at(0)["detections"][0];
   ASSERT_TRUE(marker.contains("corner_fit"));
-  EXPECT_EQ(marker["corner_fit"]["covariance_px2"].size(), 4u);
+  EXPECT_EQ(marker["corner_covariance_px2"].size(), 64u);
+  EXPECT_LT(marker["corner_covariance_px2"][0].get<double>(),
+            plain.lines().at(0)["detections"][0]["corner_covariance_px2"][0].get<double>());
   EXPECT_GT(marker["corner_fit"]["noise"].get<double>(), 0);
   EXPECT_NE(run_berth({"detect", "--corners", "guessed", kImage}).exit_code, 0);
 }

@@ -16,6 +16,7 @@
 #include "support/command_run.hpp"
 #include "support/marker_scene.hpp"
 #include "support/scratch_folder.hpp"
+#include "target/marker_pose.hpp"
 
 namespace berth {
 namespace {
@@ -72,7 +73,7 @@ std::optional<Detection> seen(const CameraModel& camera, const Pose& body, const
   // With covariances of their own the corners count as not from lines, whose bound is wider.
   const double variance = noise_px * noise_px;
   detection.corner_fit.emplace();
-  detection.corner_fit->covariance_px2.fill({variance, 0, variance});
+  detection.corner_covariance_px2 = independent_corners(std::sqrt(variance));
   return detection;
 }
 

@@ -22,9 +22,9 @@ void add_uncertainty(const PoseUncertainty& uncertainty, Json& pose) {
 Json to_json(const Detection& detection) {
   Json json = {{"family", detection.family->name}, {"id", detection.id},           {"hamming", detection.hamming},
                {"margin", detection.margin},       {"corners", detection.corners}, {"center", detection.center}};
+  if (detection.corner_covariance_px2) json["corner_covariance_px2"] = *detection.corner_covariance_px2;
   if (detection.corner_fit) {
-    json["corner_fit"] = {{"covariance_px2", detection.corner_fit->covariance_px2},
-                          {"noise", detection.corner_fit->noise},
+    json["corner_fit"] = {{"noise", detection.corner_fit->noise},
                           {"blur_px2", detection.corner_fit->blur_px2},
                           {"local_levels", detection.corner_fit->local_levels}};
   }

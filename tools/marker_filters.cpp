@@ -10,7 +10,6 @@ PoseFilterConfig config_for(const DetectorConfig& config, double size_m) {
   PoseFilterConfig filter;
   filter.camera = *config.camera;
   filter.marker_size_m = size_m;
-  filter.corner_deviation_px = config.corner_deviation_px;
   return filter;
 }
 

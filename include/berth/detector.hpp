@@ -61,9 +61,9 @@ struct DetectorConfig {
   std::vector<DiscTarget> disc_targets;
   PoseMethod pose_method = PoseMethod::least_squares;
   CornerMethod corner_method = CornerMethod::edges;
-  /// One standard deviation of a corner's coordinate, px: what poses' covariances go by (docs/pose.md) where the
-  /// corners are the edges'.
-  double corner_deviation_px = 0.15;
+  /// One standard deviation of a corner's coordinate, px, where corners are the edges': what poses' covariances go by
+  /// (docs/pose.md). 0: each marker's own, from how well its sides fit (docs/corners.md).
+  double corner_deviation_px = 0;
   /// Per-pixel gain of the flat-field correction, row-major, 1 = unchanged; empty for none.
   std::vector<float> flat_field;
   Capacities capacities;

@@ -59,10 +59,11 @@ struct PoseUncertainty {
   double ambiguity() const { return has_other && other_error_px > 0 ? error_px / other_error_px : has_other ? 1 : 0; }
 };
 
-/// How well a marker's corners are known that the photometric fit has found (docs/corners.md).
+/// Covariance of a marker's corners, px²: of x and y of the first, of the second, …; row-major 8 × 8.
+using CornerCovariance = std::array<double, 64>;
+
+/// What the photometric fit found a marker to look like (docs/corners.md).
 struct CornerFit {
-  /// Of each corner, px²: of x, of x with y, of y. From the residuals, so model errors are in it as far as they show.
-  std::array<std::array<double, 3>, 4> covariance_px2 = {};
   /// Standard deviation of what the model leaves, grey levels: the noise, where it holds.
   double noise = 0;
   /// Variance of the blur with the pixel's own square, px²: xx, xy, yy.
@@ -81,6 +82,8 @@ struct Detection {
   double margin = 0;
   std::array<std::array<double, 2>, 4> corners = {};
   std::array<double, 2> center = {};
+  /// Of the corners, from what they were found by (docs/corners.md). Empty where a Detector did not make this.
+  std::optional<CornerCovariance> corner_covariance_px2;
   /// Of corners by the photometric fit; empty where it was not asked for or did not hold, and they are the edges'.
   std::optional<CornerFit> corner_fit;
   bool has_pose = false;

@@ -13,7 +13,7 @@ struct PoseFilterConfig {
   CameraModel camera;
   /// Side of the marker, m.
   double marker_size_m = 0;
-  /// One standard deviation of a corner's coordinate, px, of markers without a CornerFit.
+  /// One standard deviation of a corner's coordinate, px, of markers without a covariance of their own.
   double corner_deviation_px = 0.15;
   /// How velocities change unforeseen: their standard deviation after one second, m/s and rad/s (a random walk).
   double acceleration = 0.5;

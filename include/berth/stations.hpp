@@ -15,7 +15,7 @@ struct Station {
   /// Marker frame to the frame of the vehicle that carries that, and the marker's side, m.
   Pose marker;
   double marker_size_m = 0;
-  /// One standard deviation of a corner's coordinate, px, of markers without a CornerFit.
+  /// One standard deviation of a corner's coordinate, px, of markers without a covariance of their own.
   double corner_deviation_px = 0.15;
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <optional>
+#include <string>
 
 #include "berth/camera.hpp"
 #include "berth/marker.hpp"
@@ -15,7 +17,19 @@ struct CalibrationDeviation {
   std::array<double, 8> distortion = {};
   /// Of the marker's side, m.
   double marker_size_m = 0;
+  /// Of how far all sides of a marker lie too far out or in, px: what a bent tone curve or saturation makes of corners
+  /// by edges (docs/corners.md).
+  double edge_px = 0;
 };
+
+/// The deviations that `berth calibrate` writes into its camera file; none where a file has none. Throws Error naming
+/// the file, the field and the remedy where they are wrong.
+std::optional<CalibrationDeviation> read_calibration_deviation(const std::string& path);
+
+/// Writes a ROS camera_info YAML file with them: readers that do not know the field pass it over. Throws Error when the
+/// file cannot be written.
+void write_camera_info(const std::string& path, const CameraModel& camera, const std::string& name,
+                       const CalibrationDeviation& deviation);
 
 /// What errors of calibration and of the marker's size make of a marker's pose: a covariance as PoseUncertainty's, of
 /// an error that is the same in every frame that shows the marker at the same place. It adds to a frame's covariance,

@@ -104,8 +104,9 @@ struct HostFinish::Impl {
     if (config.camera && !(config.marker_size_m > 0) && (!has_sizes || config.marker_size_m != 0)) {
       throw Error("marker size is " + std::to_string(config.marker_size_m) + " m; give the side that the corners span");
     }
-    if (!(config.corner_deviation_px > 0)) {
-      throw Error("corner_deviation_px is " + std::to_string(config.corner_deviation_px) + "; give px above 0");
+    if (!(config.corner_deviation_px >= 0)) {
+      throw Error("corner_deviation_px is " + std::to_string(config.corner_deviation_px) +
+                  "; give px above 0, or 0 for what each marker's edges say");
     }
     if (!config.disc_targets.empty()) {
       if (!config.camera) throw Error("targets of discs are asked for without a camera; give the camera's calibration");
@@ -180,6 +181,9 @@ struct HostFinish::Impl {
         continue;
       }
       if (decoder.decode(image, candidate, detection)) {
+        if (config.corner_deviation_px > 0) {
+          detection.corner_covariance_px2 = independent_corners(config.corner_deviation_px);
+        }
         result.detections.push_back(detection);
       } else {
         refused.push_back(candidate.fine);
@@ -196,7 +200,7 @@ struct HostFinish::Impl {
   void refine_corners(DeviceFrame& frame, FrameResult& result) {
     const View2D<const u8> image = frame.image();
     for (Detection& d : result.detections) {
-      if (!fit->refine(image, *d.family, d.id, d.corners, d.corner_fit.emplace())) {
+      if (!fit->refine(image, *d.family, d.id, d.corners, *d.corner_covariance_px2, d.corner_fit.emplace())) {
         d.corner_fit.reset();
         continue;
       }
@@ -229,8 +233,7 @@ struct HostFinish::Impl {
       d.has_pose = paper_p4p(camera, size_m, d.corners, d.pose);
       return;
     }
-    d.has_pose = marker_pose(camera, size_m, d.corners, corner_covariances(d, config.corner_deviation_px), d.pose,
-                             d.pose_uncertainty.emplace());
+    d.has_pose = marker_pose(camera, size_m, d.corners, *d.corner_covariance_px2, d.pose, d.pose_uncertainty.emplace());
     if (!d.has_pose) d.pose_uncertainty.reset();
   }
 

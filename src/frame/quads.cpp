@@ -1,5 +1,6 @@
 #include "frame/quads.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -53,6 +54,8 @@ bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& ca
     const double u_ref = (side[0] >> 1) * scale;
     coarse[k] = to_line(upright, u_ref, static_cast<double>(side[1]) * scale, side[2]);
     fine[k] = to_line(upright, u_ref, refined[0], refined[1]);
+    // Residuals are rounded down to whole 1/512 px.
+    candidate.sides[k] = {refined[2], (refined[3] + 0.5) / 512};
     if (refined[2] < kMinStations) candidate.has_fine = false;
   }
   if (!corners_of(coarse, candidate.coarse)) return false;
@@ -63,6 +66,7 @@ bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& ca
   if (candidate.reversed_border) {  // a hole is walked counter-clockwise
     std::swap(candidate.coarse[1], candidate.coarse[3]);
     std::swap(candidate.fine[1], candidate.fine[3]);
+    std::reverse(candidate.sides.begin(), candidate.sides.end());
   }
   return true;
 }

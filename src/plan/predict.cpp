@@ -55,11 +55,19 @@ bool predict(const View& view, Prediction& prediction) {
   Prediction result;
   result.corners = corner_noise(view);
   const Corners corners = true_corners(view);
-  constexpr CornerCovariances kEqual = {{{1, 0, 1}, {1, 0, 1}, {1, 0, 1}, {1, 0, 1}}};
-  for (const Corners& seen : errors_of(corners, result.corners)) {
-    const std::array<PoseCorner, 4> points = pose_corners(view.size_m, seen, kEqual);
+  const std::vector<Corners> errors = errors_of(corners, result.corners);
+  // Corners weigh what such errors leave of them, as a detection's do.
+  CornerCovariance covariance{};
+  for (const Corners& seen : errors) {
+    for (std::size_t i = 0; i < 64; ++i) {
+      const std::size_t a = i / 8, b = i % 8;
+      covariance[i] += (seen[a / 2][a % 2] - corners[a / 2][a % 2]) * (seen[b / 2][b % 2] - corners[b / 2][b % 2]);
+    }
+  }
+  for (const Corners& seen : errors) {
+    const SeenCorners points = seen_corners_of(view.size_m, seen, covariance);
     RefinedPose refined;
-    if (!refine_pose(view.camera, points.data(), points.size(), view.pose, refined)) return false;
+    if (!refine_pose(view.camera, &points, 1, view.pose, refined)) return false;
     const table::SixAxes error = table::pose_error(refined.pose, view.pose);
     for (std::size_t i = 0; i < 6; ++i) {
       for (std::size_t j = 0; j < 6; ++j) result.covariance[i * 6 + j] += error[i] * error[j];

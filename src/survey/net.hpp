@@ -20,7 +20,8 @@ struct Sight {
   std::size_t marker = 0;
   /// Where the corners were found, paper's order, px.
   std::array<Vec2, 4> seen_px = {};
-  CornerCovariances covariances_px2 = {};
+  /// Of each corner: of x, of x with y, of y.
+  std::array<std::array<double, 3>, 4> covariances_px2 = {};
   /// The corners come of lines along the sides, not of a fit of the pattern.
   bool by_lines = false;
   /// Corners that take part.

@@ -78,7 +78,8 @@ SurveyNet net_of(const SurveyFrames& frames, const CameraModel& camera, std::vec
         Sight sight;
         sight.marker = m;
         sight.seen_px = seen.corners;
-        sight.covariances_px2 = corner_covariances(seen, deviation_px);
+        const CornerCovariance covariance = corner_covariance(seen, deviation_px);
+        for (std::size_t k = 0; k < 4; ++k) sight.covariances_px2[k] = block_of(covariance, k);
         sight.by_lines = !seen.corner_fit;
         station.sights.push_back(sight);
       }

@@ -61,7 +61,7 @@ BundlePoser::BundlePoser(const Bundle& bundle) : bundle_(bundle) {
   sightings_.reserve(most);
   largest_.reserve(most);
   corners_.reserve(4 * most);
-  fitted_.reserve(4 * most);
+  fitted_.reserve(most);
   squares_.reserve(4 * most);
   sorted_.reserve(4 * most);
   in_.reserve(4 * most);
@@ -121,16 +121,15 @@ void BundlePoser::add_sighting(const BundleMarker& marker, const Detection& dete
     const Vec2 &a = detection.corners[i], &b = detection.corners[(i + 1) % 4];
     sides_px2 += (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
   }
-  sightings_.push_back({&marker, &detection, sides_px2});
   // What the place's deviation amounts to in the image, where the marker is seen at that size.
   const double pixels = bundle_.deviation_m / marker.size_m;
   const double place_px2 = pixels * pixels * sides_px2 / 4;
-  for (PoseCorner corner :
-       pose_corners(marker.size_m, detection.corners, corner_covariances(detection, corner_deviation_px))) {
-    corner.point_m = transform(marker.pose, corner.point_m);
-    corner.covariance_px2[0] += place_px2;
-    corner.covariance_px2[2] += place_px2;
-    corners_.push_back(corner);
+  CornerCovariance covariance = corner_covariance(detection, corner_deviation_px);
+  for (std::size_t i = 0; i < 8; ++i) covariance[9 * i] += place_px2;
+  sightings_.push_back({&marker, &detection, sides_px2, covariance});
+  const std::array<Vec3, 4> places = corner_places(marker.size_m);
+  for (std::size_t i = 0; i < 4; ++i) {
+    corners_.push_back({transform(marker.pose, places[i]), detection.corners[i], block_of(covariance, i)});
   }
 }
 
@@ -214,14 +213,27 @@ bool BundlePoser::keep_markers_whole() {
 // evaluated (Geman and McClure's weights).
 bool BundlePoser::fit(const CameraModel& camera, const Pose& start, RefinedPose& result, double soft_bound) {
   fitted_.clear();
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    if (in_[i] == 0) continue;
-    PoseCorner corner = corners_[i];
-    if (soft_bound > 0) {
-      const double by = 1 + squares_[i] / soft_bound;
-      for (double& value : corner.covariance_px2) value *= by * by;
+  for (std::size_t first = 0; first < corners_.size(); first += 4) {
+    const CornerCovariance& all = sightings_[first / 4].covariance_px2;
+    SeenCorners seen;
+    std::array<std::size_t, 4> which{};
+    std::array<double, 4> by{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (in_[first + i] == 0) continue;
+      which[seen.count] = i;
+      by[seen.count] = soft_bound > 0 ? 1 + squares_[first + i] / soft_bound : 1;
+      seen.points_m[seen.count] = corners_[first + i].point_m;
+      seen.seen_px[seen.count++] = corners_[first + i].seen_px;
     }
-    fitted_.push_back(corner);
+    if (seen.count == 0) continue;
+    CornerCovariance covariance{};
+    for (std::size_t i = 0; i < 2 * seen.count; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) {
+        covariance[8 * i + j] = by[i / 2] * by[j / 2] * all[8 * (2 * which[i / 2] + i % 2) + 2 * which[j / 2] + j % 2];
+      }
+    }
+    if (!seen.set_covariance(covariance)) return false;
+    fitted_.push_back(seen);
   }
   return refine_pose(camera, fitted_.data(), fitted_.size(), start, result);
 }

@@ -34,6 +34,8 @@ class BundlePoser {
     const Detection* detection = nullptr;
     /// Of its sides, px^2: the larger a marker is seen, the surer its own pose.
     double sides_px2 = 0;
+    /// Of its corners, with what its place adds.
+    CornerCovariance covariance_px2 = {};
   };
 
   int gather(const std::vector<Detection>& detections, double corner_deviation_px);
@@ -59,8 +61,8 @@ class BundlePoser {
   std::vector<PoseCorner> corners_;
   std::vector<double> squares_;
   std::vector<unsigned char> in_;
-  /// Room for those that go into a fit, and for the squares in order.
-  std::vector<PoseCorner> fitted_;
+  /// Room for the markers that go into a fit, with the corners that do, and for the squares in order.
+  std::vector<SeenCorners> fitted_;
   std::vector<double> sorted_;
   std::vector<std::size_t> largest_;
   /// Middle of the markers seen. Turns about it and shifts do not depend on each other much; about a field's corner,

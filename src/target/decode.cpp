@@ -23,7 +23,7 @@ struct Found {
   CodeMatch match;
 };
 
-void fill(const QuadCandidate& quad, const Found& found, double margin, Detection& detection) {
+void fill(View2D<const u8> image, const QuadCandidate& quad, const Found& found, double margin, Detection& detection) {
   detection = Detection();
   detection.family = &found.matcher->book().family();
   detection.id = found.match.entry / 4;
@@ -32,7 +32,14 @@ void fill(const QuadCandidate& quad, const Found& found, double margin, Detectio
   // A marker turned clockwise by `turns` has its upper left at the candidate's corner number `turns`; from there the
   // paper goes counter-clockwise and the candidate clockwise.
   const std::size_t turns = static_cast<std::size_t>(found.match.entry % 4);
-  for (std::size_t i = 0; i < 4; ++i) detection.corners[i] = quad.fine[(turns + 4 - i) & 3];
+  std::array<SideFit, 4> sides;
+  for (std::size_t i = 0; i < 4; ++i) {
+    detection.corners[i] = quad.fine[(turns + 4 - i) & 3];
+    if (quad.has_fine) sides[i] = quad.sides[(turns + 3 - i) & 3];
+  }
+  const int border = detection.family->border_width;
+  detection.corner_covariance_px2 =
+      side_covariance(detection.corners, border, sides, side_blurs(image, detection.corners, border));
   QuadMap map;
   if (map.set(quad.fine, 1, 0)) map.at(0.5, 0.5, detection.center[0], detection.center[1]);
 }
@@ -138,7 +145,7 @@ bool Decoder::decode(View2D<const u8> image, const QuadCandidate& quad, Detectio
     if (group.layout.reversed_border != quad.reversed_border) continue;
     Attempt attempt(image, group);
     if (!attempt.read(quad)) continue;
-    fill(quad, attempt.found(), attempt.margin(), detection);
+    fill(image, quad, attempt.found(), attempt.margin(), detection);
     return true;
   }
   return false;

@@ -6,6 +6,7 @@
 
 #include "berth/image.hpp"
 #include "berth/marker.hpp"
+#include "target/side_covariance.hpp"
 
 namespace berth {
 
@@ -17,6 +18,8 @@ struct QuadCandidate {
   /// From the lines refitted to the gray-level edges; equal to coarse where has_fine is false.
   std::array<std::array<double, 2>, 4> fine = {};
   bool has_fine = false;
+  /// Of the fine lines: side k is from corner k to the next.
+  std::array<SideFit, 4> sides = {};
   /// Light inside, dark outside.
   bool reversed_border = false;
 };

@@ -1,5 +1,6 @@
 #include "target/fit_pass.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "target/block_models.hpp"
@@ -17,6 +18,10 @@ constexpr int kLeastPairs = 100;
 // and four blocks in markers from that size on.
 constexpr double kQuarters_px = 32, kFours_px = 88;
 constexpr int kHalfSide = LensBlocks::kSide / 2;
+// Measured on the corpora, with their coarsely rendered blurs and their shadows (docs/corners.md): what a small marker
+// adds, what correlated levels add, and what places with levels of their own do. Unknowns that the pixels determine.
+constexpr double kSmallSide_px = 15, kCorrelated = 15, kLocalTimes = 4.5, kFreedom = 17;
+constexpr double kResidualScale = 256;  // squares of residuals, q8
 
 // One block of a place.
 struct Part {
@@ -172,6 +177,19 @@ bool FitPass::run(const FitScene& scene, const FitState& state, Share share) {
 double FitPass::correlation() const {
   if (pairs_ < kLeastPairs || !(even_squares_ > 0)) return 0;
   return (pair_products_ / pairs_) / (even_squares_ / even_);
+}
+
+double FitPass::excess(double side_px) const {
+  const double small = kSmallSide_px / side_px;
+  const double times = pixels / (pixels - kFreedom) * (1 + small * small);
+  if (tones_ == Tones::local) return times * kLocalTimes;
+  double at_edges = 1;
+  if (even_ >= kLeastPairs && pixels > even_ && normal.squares() > 0) {
+    const double share = (normal.squares() - even_squares_ / kResidualScale) / normal.squares();
+    at_edges = std::max(1.0, share * pixels / (pixels - even_));
+  }
+  const double known = pairs_ > 0 ? 2 / std::sqrt(static_cast<double>(pairs_)) : 0;  // two deviations of no correlation
+  return times * at_edges * (1 + kCorrelated * std::max(0.0, correlation() - known));
 }
 
 }  // namespace berth

@@ -21,6 +21,9 @@ class FitPass {
   /// Of residuals that are neighbours in a row and away from all edges: 0 where they are noise or too few, near 1 where
   /// the levels are wrong.
   double correlation() const;
+  /// How many times the corners' covariance is that of independent residuals: what the model leaves is correlated, and
+  /// more of it where the edges are (docs/corners.md).
+  double excess(double side_px) const;
 
   FitNormal normal;
   MarkerMap map;

@@ -9,37 +9,46 @@
 namespace berth {
 bool faces_camera(const Pose& marker) { return dot(column(marker.R, 2), marker.t) > 0; }
 
-CornerCovariances corner_covariances(const Detection& marker, double deviation_px) {
-  if (marker.corner_fit) return marker.corner_fit->covariance_px2;
-  CornerCovariances covariances;
-  covariances.fill({deviation_px * deviation_px, 0, deviation_px * deviation_px});
-  return covariances;
+CornerCovariance independent_corners(double deviation_px) {
+  CornerCovariance covariance{};
+  for (std::size_t i = 0; i < 8; ++i) covariance[9 * i] = deviation_px * deviation_px;
+  return covariance;
 }
 
-std::array<PoseCorner, 4> pose_corners(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
-                                       const CornerCovariances& covariances_px2) {
-  const std::array<Vec3, 4> places = corner_places(size_m);
-  std::array<PoseCorner, 4> corners;
-  for (std::size_t i = 0; i < 4; ++i) corners[i] = {places[i], corners_px[i], covariances_px2[i]};
-  return corners;
+CornerCovariance corner_covariance(const Detection& marker, double deviation_px) {
+  return marker.corner_covariance_px2 ? *marker.corner_covariance_px2 : independent_corners(deviation_px);
+}
+
+std::array<double, 3> block_of(const CornerCovariance& covariance_px2, std::size_t corner) {
+  const double* const first = &covariance_px2[18 * corner];
+  return {first[0], first[1], first[9]};
+}
+
+SeenCorners seen_corners_of(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
+                            const CornerCovariance& covariance_px2) {
+  SeenCorners seen;
+  seen.count = 4;
+  seen.points_m = corner_places(size_m);
+  seen.seen_px = corners_px;
+  if (!seen.set_covariance(covariance_px2)) seen.count = 0;
+  return seen;
 }
 
 bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
                  const std::array<std::array<double, 2>, 4>& corners_px, Pose& pose, PoseUncertainty& uncertainty) {
-  return marker_pose(camera, size_m, corners_px, corner_covariances({}, deviation_px), pose, uncertainty);
+  return marker_pose(camera, size_m, corners_px, independent_corners(deviation_px), pose, uncertainty);
 }
 
 bool marker_pose(const CameraModel& camera, double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
-                 const CornerCovariances& covariances_px2, Pose& pose, PoseUncertainty& uncertainty) {
+                 const CornerCovariance& covariance_px2, Pose& pose, PoseUncertainty& uncertainty) {
   std::array<Pose, 2> starts;
   const int count = planar_poses(camera, size_m, corners_px, starts);
-  const std::array<PoseCorner, 4> corners = pose_corners(size_m, corners_px, covariances_px2);
+  const SeenCorners corners = seen_corners_of(size_m, corners_px, covariance_px2);
   std::array<RefinedPose, 2> refined;
   std::size_t found = 0;
   for (int k = 0; k < count; ++k) {
     RefinedPose& result = refined[found];
-    if (refine_pose(camera, corners.data(), corners.size(), starts[static_cast<std::size_t>(k)], result) &&
-        faces_camera(result.pose)) {
+    if (refine_pose(camera, &corners, 1, starts[static_cast<std::size_t>(k)], result) && faces_camera(result.pose)) {
       ++found;
     }
   }

@@ -8,24 +8,25 @@
 
 namespace berth {
 
-/// Of each corner, px^2: of x, of x with y, of y.
-using CornerCovariances = std::array<std::array<double, 3>, 4>;
-
-/// The marker's own where its corners were fitted, else one standard deviation of every coordinate, px.
-CornerCovariances corner_covariances(const Detection& marker, double deviation_px);
+/// Of corners with one standard deviation of every coordinate, px, each independent of the others.
+CornerCovariance independent_corners(double deviation_px);
+/// The marker's own where it has one, else that.
+CornerCovariance corner_covariance(const Detection& marker, double deviation_px);
+/// Of one corner alone: of x, of x with y, of y.
+std::array<double, 3> block_of(const CornerCovariance& covariance_px2, std::size_t corner);
 
 /// Whether the camera sees the marker's front: its z axis points away then.
 bool faces_camera(const Pose& marker);
 
-/// A marker's four corners (paper's order) as refine_pose takes them.
-std::array<PoseCorner, 4> pose_corners(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
-                                       const CornerCovariances& covariances_px2);
+/// A marker's four corners (paper's order) as refine_pose takes them; with none where that is no covariance.
+SeenCorners seen_corners_of(double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
+                            const CornerCovariance& covariance_px2);
 
 /// Pose of a square marker of side `size_m` from its corners (paper's order, px, distorted): both poses of a plane,
 /// each refined, the one that fits better, with what is known of it (docs/pose.md). Returns false when the corners are
 /// degenerate or behind the camera.
 bool marker_pose(const CameraModel& camera, double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
-                 const CornerCovariances& covariances_px2, Pose& pose, PoseUncertainty& uncertainty);
+                 const CornerCovariance& covariance_px2, Pose& pose, PoseUncertainty& uncertainty);
 /// The same with one standard deviation of every coordinate, px.
 bool marker_pose(const CameraModel& camera, double size_m, double deviation_px,
                  const std::array<std::array<double, 2>, 4>& corners_px, Pose& pose, PoseUncertainty& uncertainty);

@@ -47,6 +47,12 @@ constexpr double kLeastNoise = 0.1;  // grey levels²: about what rounding to in
 
 // The paper's order to clockwise and back: upper left, lower left, lower right, upper right.
 Corners turned_round(const Corners& corners) { return {corners[0], corners[3], corners[2], corners[1]}; }
+CornerCovariance turned_round(const CornerCovariance& covariance) {
+  constexpr std::array<std::size_t, 8> kFrom = {0, 1, 6, 7, 4, 5, 2, 3};
+  CornerCovariance turned;
+  for (std::size_t i = 0; i < 64; ++i) turned[i] = covariance[8 * kFrom[i / 8] + kFrom[i % 8]];
+  return turned;
+}
 
 // Moves levels and tone curve; false where they are out of all bounds.
 bool move_levels(const FitVector& step, FitState& state) {
@@ -140,19 +146,16 @@ class Step {
     const FieldToCorners corners = corners_of_field(pass_.map, border_);
     const Corners before = state_.corners;
     double variances = 0;
-    for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        for (std::size_t k = 0; k < 8; ++k) state_.corners[i][axis] += corners[2 * i + axis][k] * step[kField + k];
+    std::array<std::array<double, kUnknowns - kField>, 8> white;
+    for (std::size_t i = 0; i < 8; ++i) {
+      for (std::size_t k = 0; k < 8; ++k) state_.corners[i / 2][i % 2] += corners[i][k] * step[kField + k];
+      white[i] = whitened(factor, corners[i]);
+      for (std::size_t j = 0; j <= i; ++j) {
+        double sum = 0;
+        for (std::size_t k = 0; k < white[i].size(); ++k) sum += noise_ * white[i][k] * white[j][k];
+        covariance_px2_[8 * i + j] = covariance_px2_[8 * j + i] = sum;
       }
-      const auto x = whitened(factor, corners[2 * i]), y = whitened(factor, corners[2 * i + 1]);
-      double xx = 0, xy = 0, yy = 0;
-      for (std::size_t k = 0; k < x.size(); ++k) {
-        xx += noise_ * x[k] * x[k];
-        xy += noise_ * x[k] * y[k];
-        yy += noise_ * y[k] * y[k];
-      }
-      covariance_px2_[i] = {xx, xy, yy};
-      variances += xx + yy;
+      variances += covariance_px2_[9 * i];
     }
     moved_px_ = farthest(before, state_.corners);
     deviation_px_ = std::sqrt(variances / 4);
@@ -165,20 +168,21 @@ class Step {
   }
   /// Variance of a residual, grey levels².
   double noise() const { return noise_; }
-  const std::array<std::array<double, 3>, 4>& covariance_px2() const { return covariance_px2_; }
+  /// Of the corners, clockwise.
+  const CornerCovariance& covariance_px2() const { return covariance_px2_; }
 
  private:
   const FitPass& pass_;
   double border_;
   FitState& state_;
   double noise_ = 0, moved_px_ = 0, deviation_px_ = 0, blur_change_ = 0;
-  std::array<std::array<double, 3>, 4> covariance_px2_;
+  CornerCovariance covariance_px2_ = {};
 };
 
 }  // namespace
 
 bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, int id, Corners& corners,
-                            CornerFit& fit) {
+                            CornerCovariance& covariance_px2, CornerFit& fit) {
   cells_.set(family, id);
   FitState state;
   state.corners = turned_round(corners);
@@ -221,8 +225,9 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
     }
     if (last) {
       corners = turned_round(state.corners);
-      const auto& covariances = next.covariance_px2();
-      fit.covariance_px2 = {covariances[0], covariances[3], covariances[2], covariances[1]};
+      covariance_px2 = turned_round(next.covariance_px2());
+      const double excess = pass.excess(state.side_px);
+      for (double& value : covariance_px2) value *= excess;
       fit.noise = std::sqrt(next.noise());
       fit.blur_px2 = state.blur;
       fit.local_levels = tones == Tones::local;

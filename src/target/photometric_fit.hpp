@@ -20,9 +20,11 @@ class PhotometricFit {
   /// For images of one size; without a camera the marker's edges are taken as straight in the image. Takes all memory.
   PhotometricFit(const std::optional<CameraModel>& camera, int width, int height) : lens_(camera, width, height) {}
 
-  /// `corners`: paper's order, px, within about a quarter of a module. On success they become the fit's, and `fit` says
-  /// how well they are known. Returns false and changes nothing where the model does not hold: see docs/corners.md.
-  bool refine(View2D<const u8> image, const MarkerFamily& family, int id, Corners& corners, CornerFit& fit);
+  /// `corners`: paper's order, px, within about a quarter of a module. On success they become the fit's,
+  /// `covariance_px2` says how well they are known, and `fit` what the marker looks like. Returns false and changes
+  /// nothing where the model does not hold: see docs/corners.md.
+  bool refine(View2D<const u8> image, const MarkerFamily& family, int id, Corners& corners,
+              CornerCovariance& covariance_px2, CornerFit& fit);
 
  private:
   LensBlocks lens_;

@@ -102,11 +102,11 @@ struct PoseFilter::Impl {
 
   /// The frame's planar poses without any past, each at that cost and what its corners are off.
   void start(const Detection& marker, double cost) {
-    const auto corners = corners_of(marker);
+    const SeenCorners corners = corners_of(marker);
     const Pose* poses[] = {&marker.pose, other_of(marker)};
     for (const Pose* pose : poses) {
       RefinedPose refined;
-      if (pose == nullptr || !refine_pose(config.camera, corners.data(), corners.size(), *pose, refined)) continue;
+      if (pose == nullptr || !refine_pose(config.camera, &corners, 1, *pose, refined)) continue;
       Way way;
       way.motion.pose = refined.pose;
       way.motion.pose_covariance = refined.covariance;
@@ -122,7 +122,7 @@ struct PoseFilter::Impl {
 
   /// Each way goes on to each pose that the frame's corners and its past allow.
   void go_on(const Detection& marker) {
-    const auto corners = corners_of(marker);
+    const SeenCorners corners = corners_of(marker);
     for (std::size_t k = 0; k < way_count; ++k) {
       PosePrior prior{ways[k].motion.pose, {}};
       if (!invert<6>(ways[k].motion.pose_covariance, prior.information)) continue;
@@ -132,8 +132,7 @@ struct PoseFilter::Impl {
         const double off = quadratic<6>(prior.information, step_between(prior.pose, *pose));
         if (pose != &prior.pose && (off < kSameSlope || off > kReach)) continue;
         RefinedPose refined;
-        if (!refine_pose(config.camera, corners.data(), corners.size(), *pose, refined, &prior) ||
-            refined.chi_square > config.gate) {
+        if (!refine_pose(config.camera, &corners, 1, *pose, refined, &prior) || refined.chi_square > config.gate) {
           continue;
         }
         Way way = ways[k];
@@ -145,8 +144,8 @@ struct PoseFilter::Impl {
     }
   }
 
-  std::array<PoseCorner, 4> corners_of(const Detection& marker) const {
-    return pose_corners(config.marker_size_m, marker.corners, corner_covariances(marker, config.corner_deviation_px));
+  SeenCorners corners_of(const Detection& marker) const {
+    return seen_corners_of(config.marker_size_m, marker.corners, corner_covariance(marker, config.corner_deviation_px));
   }
 
   static const Pose* other_of(const Detection& marker) {

@@ -49,22 +49,41 @@ struct PoseNormal {
   }
 };
 
-/// The two rows of a corner that lies at `at` in the camera frame. `row_of` takes the derivative of an image
-/// coordinate by the point in the camera frame (px/m) to that by a step of the pose. Returns false where the point is
-/// not before the camera or its covariance is none.
-template <class RowOf>
-bool add_seen(const CameraModel& camera, const Vec3& at, const PoseCorner& corner, PoseNormal& normal, RowOf row_of) {
+/// The rows of corners. `place_of(i)` is where corner i is in the camera frame, `row_of(i, by_point)` takes the
+/// derivative of an image coordinate by that point (px/m) to that by a step of the pose. Returns false where a point is
+/// not before the camera.
+template <class PlaceOf, class RowOf>
+bool add_seen(const CameraModel& camera, const SeenCorners& corners, PoseNormal& normal, PlaceOf place_of,
+              RowOf row_of) {
   constexpr double kNearest_m = 1e-6;
-  if (!(at[2] > kNearest_m)) return false;
-  const double x = at[0] / at[2], y = at[1] / at[2];
-  std::array<double, 4> lens{};
-  const Vec2 image = camera.project(x, y, lens);
-  std::array<std::array<double, 6>, 2> rows{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    const double dx = lens[2 * k] / at[2], dy = lens[2 * k + 1] / at[2];
-    rows[k] = row_of(Vec3{dx, dy, -(dx * x + dy * y)});
+  std::array<std::array<double, 6>, 8> rows{};
+  std::array<double, 8> off{};
+  const std::size_t count = 2 * corners.count;
+  for (std::size_t i = 0; i < corners.count; ++i) {
+    const Vec3 at = place_of(i);
+    if (!(at[2] > kNearest_m)) return false;
+    const double x = at[0] / at[2], y = at[1] / at[2];
+    std::array<double, 4> lens{};
+    const Vec2 image = camera.project(x, y, lens);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double dx = lens[2 * k] / at[2], dy = lens[2 * k + 1] / at[2];
+      rows[2 * i + k] = row_of(i, Vec3{dx, dy, -(dx * x + dy * y)});
+      off[2 * i + k] = corners.seen_px[i][k] - image[k];
+      normal.squares_px += off[2 * i + k] * off[2 * i + k];
+    }
   }
-  return normal.add_pair(rows, {corner.seen_px[0] - image[0], corner.seen_px[1] - image[1]}, corner.covariance_px2);
+  // Whitened: the covariance's factor solved for them.
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* const factor = &corners.factor[8 * i];
+    for (std::size_t j = 0; j < i; ++j) {
+      for (std::size_t k = 0; k < 6; ++k) rows[i][k] -= factor[j] * rows[j][k];
+      off[i] -= factor[j] * off[j];
+    }
+    for (double& value : rows[i]) value /= factor[i];
+    off[i] /= factor[i];
+    normal.add_row(rows[i], off[i]);
+  }
+  return true;
 }
 
 /// The row of an image coordinate: its derivative by a point, where a step of the pose moves that by dt + w x arm.
@@ -73,12 +92,28 @@ inline std::array<double, 6> step_row(const Vec3& by_point, const Vec3& arm) {
   return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
 }
 
-/// A corner of a target at `pose` in the camera frame: derivatives by translation, then rotation about the camera's
+/// Corners of a target at `pose` in the camera frame: derivatives by translation, then rotation about the camera's
 /// axes.
+inline bool add_corners(const CameraModel& camera, const Pose& pose, const SeenCorners& corners, PoseNormal& normal) {
+  std::array<Vec3, 4> arms{};
+  for (std::size_t i = 0; i < corners.count; ++i) arms[i] = product(pose.R, corners.points_m[i]);
+  return add_seen(
+      camera, corners, normal, [&](std::size_t i) { return add(arms[i], pose.t); },
+      [&](std::size_t i, const Vec3& by_point) { return step_row(by_point, arms[i]); });
+}
+
+/// One corner; false too where its covariance is none.
 inline bool add_corner(const CameraModel& camera, const Pose& pose, const PoseCorner& corner, PoseNormal& normal) {
-  const Vec3 arm = product(pose.R, corner.point_m);
-  return add_seen(camera, add(arm, pose.t), corner, normal,
-                  [&](const Vec3& by_point) { return step_row(by_point, arm); });
+  SeenCorners one;
+  one.count = 1;
+  one.points_m[0] = corner.point_m;
+  one.seen_px[0] = corner.seen_px;
+  const auto& [xx, xy, yy] = corner.covariance_px2;
+  CornerCovariance covariance{};
+  covariance[0] = xx;
+  covariance[1] = covariance[8] = xy;
+  covariance[9] = yy;
+  return one.set_covariance(covariance) && add_corners(camera, pose, one, normal);
 }
 
 /// Levenberg-Marquardt from a pose nearby. `linearise(pose, normal)` fills the normal equations, or returns false where

@@ -22,22 +22,47 @@ void add_prior(const Pose& pose, const PosePrior& prior, PoseNormal& normal) {
   normal.squares += quadratic<6>(prior.information, off);
 }
 
-}  // namespace
-
-bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
-                 RefinedPose& result, const PosePrior* prior) {
-  if (count < 3) return false;
+// `add_part(i, pose, normal)` adds part i of `parts`, which have so many corners together.
+template <class AddPart>
+bool refine_by(std::size_t parts, AddPart add_part, std::size_t corners, const Pose& start, RefinedPose& result,
+               const PosePrior* prior) {
+  if (corners < 3) return false;
   const auto linearise = [&](const Pose& pose, PoseNormal& normal) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!add_corner(camera, pose, corners[i], normal)) return false;
+    for (std::size_t i = 0; i < parts; ++i) {
+      if (!add_part(i, pose, normal)) return false;
     }
     if (prior != nullptr) add_prior(pose, *prior, normal);
     return true;
   };
   double squares_px = 0;
   if (!least_squares_pose(start, linearise, result, squares_px)) return false;
-  result.error_px = std::sqrt(squares_px / static_cast<double>(count));
+  result.error_px = std::sqrt(squares_px / static_cast<double>(corners));
   return true;
+}
+
+}  // namespace
+
+bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
+                 RefinedPose& result, const PosePrior* prior) {
+  return refine_by(
+      count,
+      [&](std::size_t i, const Pose& pose, auto& normal) { return add_corner(camera, pose, corners[i], normal); },
+      count, start, result, prior);
+}
+
+bool refine_pose(const CameraModel& camera, const SeenCorners* markers, std::size_t count, const Pose& start,
+                 RefinedPose& result, const PosePrior* prior) {
+  std::size_t corners = 0;
+  for (std::size_t i = 0; i < count; ++i) corners += markers[i].count;
+  return refine_by(
+      count,
+      [&](std::size_t i, const Pose& pose, auto& normal) { return add_corners(camera, pose, markers[i], normal); },
+      corners, start, result, prior);
+}
+
+bool SeenCorners::set_covariance(const CornerCovariance& covariance_px2) {
+  factor = covariance_px2;
+  return factorise<8>(factor, 1e-14, 2 * count);
 }
 
 double whitened_square(const Vec2& off_px, const std::array<double, 3>& covariance_px2) {

@@ -16,6 +16,18 @@ struct PoseCorner {
   std::array<double, 3> covariance_px2 = {1, 0, 1};
 };
 
+/// Up to four corners of one marker, whose errors go together.
+struct SeenCorners {
+  std::size_t count = 0;
+  std::array<std::array<double, 3>, 4> points_m = {};
+  std::array<std::array<double, 2>, 4> seen_px = {};
+  /// Cholesky factor of their covariance, the lower triangle of its first 2 count rows (8 numbers each).
+  CornerCovariance factor = {};
+
+  /// False where it is no covariance.
+  bool set_covariance(const CornerCovariance& covariance_px2);
+};
+
 /// What is known of a pose before its corners are seen.
 struct PosePrior {
   Pose pose;
@@ -40,6 +52,9 @@ struct RefinedPose {
 /// `result` alone, where the start has a corner behind the camera, the corners do not determine the pose, or 30 steps
 /// do not come to an end. Needs three corners or more.
 bool refine_pose(const CameraModel& camera, const PoseCorner* corners, std::size_t count, const Pose& start,
+                 RefinedPose& result, const PosePrior* prior = nullptr);
+/// The same of markers.
+bool refine_pose(const CameraModel& camera, const SeenCorners* markers, std::size_t count, const Pose& start,
                  RefinedPose& result, const PosePrior* prior = nullptr);
 
 /// Square of a residual (px) in standard deviations of its covariance (px^2: of x, of x with y, of y).

@@ -26,18 +26,18 @@ RefinedPose by_dock(const Station& station, const RefinedPose& view) {
   return compose(station.camera, compose(view, inverse(station.marker)));
 }
 
-std::array<PoseCorner, 4> corners_of(const Station& station, const Detection& marker) {
-  return pose_corners(station.marker_size_m, marker.corners, corner_covariances(marker, station.corner_deviation_px));
+SeenCorners corners_of(const Station& station, const Detection& marker) {
+  return seen_corners_of(station.marker_size_m, marker.corners, corner_covariance(marker, station.corner_deviation_px));
 }
 
 template <class ToRobot>
 Solutions solutions(const Station& station, const Detection* marker, ToRobot to_robot) {
   Solutions found;
   if (marker == nullptr || !marker->has_pose || !marker->pose_uncertainty) return found;
-  const std::array<PoseCorner, 4> corners = corners_of(station, *marker);
+  const SeenCorners corners = corners_of(station, *marker);
   const auto add = [&](const Pose& start) {
     RefinedPose view;
-    if (!refine_pose(station.lens, corners.data(), corners.size(), start, view)) return;
+    if (!refine_pose(station.lens, &corners, 1, start, view)) return;
     found.of_robot[found.count++] = to_robot(station, view);
   };
   add(marker->pose);
@@ -57,32 +57,34 @@ class BothViews {
         seen_by_dock_(corners_of(dock_, dock)) {}
 
   bool operator()(const Pose& pose, PoseNormal& normal) const {
+    std::array<Vec3, 4> arms;
     // A point of the robot is at R b + t in the dock's frame.
-    for (const PoseCorner& corner : seen_by_dock_) {
-      const Vec3 arm = product(pose.R, transform(dock_.marker, corner.point_m));
-      const Vec3 at = transform(to_dock_, add(arm, pose.t));
-      if (!add_seen(dock_.lens, at, corner, normal,
-                    [&](const Vec3& by_point) { return step_row(product(transposed(to_dock_.R), by_point), arm); })) {
-        return false;
-      }
+    for (std::size_t i = 0; i < 4; ++i) {
+      arms[i] = product(pose.R, transform(dock_.marker, seen_by_dock_.points_m[i]));
+    }
+    if (!add_seen(
+            dock_.lens, seen_by_dock_, normal, [&](std::size_t i) { return transform(to_dock_, add(arms[i], pose.t)); },
+            [&](std::size_t i, const Vec3& by_point) {
+              return step_row(product(transposed(to_dock_.R), by_point), arms[i]);
+            })) {
+      return false;
     }
     // A point c of the dock is at Rᵀ (c - t) in the robot's frame, which a step moves by -Rᵀ (dt + w x (c - t)).
-    for (const PoseCorner& corner : seen_by_robot_) {
-      const Vec3 arm = add(transform(robot_.marker, corner.point_m), scaled(pose.t, -1));
-      const Vec3 at = transform(to_robot_, product(transposed(pose.R), arm));
-      if (!add_seen(robot_.lens, at, corner, normal, [&](const Vec3& by_point) {
-            return step_row(scaled(product(pose.R, product(transposed(to_robot_.R), by_point)), -1), arm);
-          })) {
-        return false;
-      }
+    for (std::size_t i = 0; i < 4; ++i) {
+      arms[i] = add(transform(robot_.marker, seen_by_robot_.points_m[i]), scaled(pose.t, -1));
     }
-    return true;
+    return add_seen(
+        robot_.lens, seen_by_robot_, normal,
+        [&](std::size_t i) { return transform(to_robot_, product(transposed(pose.R), arms[i])); },
+        [&](std::size_t i, const Vec3& by_point) {
+          return step_row(scaled(product(pose.R, product(transposed(to_robot_.R), by_point)), -1), arms[i]);
+        });
   }
 
  private:
   const Station &robot_, &dock_;
   Pose to_robot_, to_dock_;  // vehicle to camera
-  std::array<PoseCorner, 4> seen_by_robot_, seen_by_dock_;
+  SeenCorners seen_by_robot_, seen_by_dock_;
 };
 
 double apart(const Pose& a, const Pose& b) {

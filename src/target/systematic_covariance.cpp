@@ -2,6 +2,7 @@
 
 #include "target/marker_pose.hpp"
 #include "target/pose_steps.hpp"
+#include "target/side_covariance.hpp"
 
 namespace berth {
 namespace {
@@ -15,16 +16,19 @@ class Deviations {
         pose_(marker.pose),
         size_m_(size_m),
         // All alike where the fit does not say: only their ratios count.
-        corners_(pose_corners(size_m, marker.corners, corner_covariances(marker, 1))) {}
+        corners_(seen_corners_of(size_m, marker.corners, corner_covariance(marker, 1))) {}
 
-  bool add(const CameraModel& camera, double size_m) {
+  bool add(const CameraModel& camera, double size_m, double edge_px = 0) {
     PoseNormal normal;
     const std::array<Vec3, 4> places = corner_places(size_m);
-    for (std::size_t i = 0; i < 4; ++i) {
-      corners_[i].seen_px = image_of(camera, transform(pose_, places[i]));
-      if (!add_corner(camera_, pose_, corners_[i], normal)) return false;
+    for (std::size_t i = 0; i < 4; ++i) corners_.seen_px[i] = image_of(camera, transform(pose_, places[i]));
+    if (edge_px > 0) {
+      const std::array<Vec2, 4> by = outwards(corners_.seen_px);
+      for (std::size_t i = 0; i < 4; ++i) {
+        for (std::size_t k = 0; k < 2; ++k) corners_.seen_px[i][k] += edge_px * by[i][k];
+      }
     }
-    if (!factorise<6>(normal.matrix)) return false;
+    if (!add_corners(camera_, pose_, corners_, normal) || !factorise<6>(normal.matrix)) return false;
     const std::array<double, 6> step = solve<6>(normal.matrix, normal.gradient);
     for (std::size_t i = 0; i < 6; ++i) {
       for (std::size_t j = 0; j < 6; ++j) covariance_[i * 6 + j] += step[i] * step[j];
@@ -49,7 +53,7 @@ class Deviations {
   const CameraModel& camera_;
   Pose pose_;
   double size_m_;
-  std::array<PoseCorner, 4> corners_;
+  SeenCorners corners_;
   std::array<double, 36> covariance_ = {};
 };
 
@@ -61,7 +65,8 @@ bool systematic_covariance(const CameraModel& camera, double marker_size_m, cons
   Deviations sum(camera, marker_size_m, marker);
   bool all = sum.add(&CameraModel::fx, deviation.fx) && sum.add(&CameraModel::fy, deviation.fy) &&
              sum.add(&CameraModel::cx, deviation.cx) && sum.add(&CameraModel::cy, deviation.cy) &&
-             sum.add(camera, marker_size_m + deviation.marker_size_m);
+             sum.add(camera, marker_size_m + deviation.marker_size_m) &&
+             sum.add(camera, marker_size_m, deviation.edge_px);
   for (std::size_t i = 0; all && i < deviation.distortion.size(); ++i) {
     all = sum.add_coefficient(i, deviation.distortion[i]);
   }
