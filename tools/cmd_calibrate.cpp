@@ -178,7 +178,7 @@ int run_calibrate(const CalibrateCommand& command, Console& console) {
   // The plot shows what is wrong, so it is there all the same.
   const std::vector<std::string> doubts = result.objections(set);
   if (!doubts.empty()) return refuse(doubts, console);
-  write_camera_info(command.out, result.camera, command.name);
+  write_camera_info(command.out, result.camera, command.name, deviation_of(result));
   console.out() << command.out << ": for images of " << set.width() << "x" << set.height() << '\n';
   return kOk;
 }

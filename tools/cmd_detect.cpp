@@ -14,6 +14,7 @@
 #include "commands.hpp"
 #include "engine.hpp"
 #include "frame_json.hpp"
+#include "systematic_show.hpp"
 #include "target_show.hpp"
 
 namespace berth::cli {
@@ -28,6 +29,7 @@ constexpr const char* kExamples = R"(Examples:
   berth detect --camera cam.yaml --size 0.08 --draw annotated/ photos/
   berth detect --camera cam.yaml --bundle dock.yaml photos/
   berth detect --camera cam.yaml --target targets/port.yaml photos/
+  berth detect --camera cam.yaml --size 0.08 --size-deviation 0.0002 photos/   what calibration and size leave open
 
 Corners start at the upper left of the upright marker and go counter-clockwise; pixel centres lie at integers.)";
 
@@ -94,11 +96,16 @@ class DrawTarget {
   std::set<std::string> used_;
 };
 
-void print_table(Console& console, const std::string& image, const TimedResult& result, const DetectorConfig& config) {
+/// Of each detection, what is off in every frame alike.
+using Systematic = std::vector<std::optional<std::array<double, 36>>>;
+
+void print_table(Console& console, const std::string& image, const TimedResult& result,
+                 const DetectorConfig& config, const Systematic& systematic) {
   const std::vector<Detection>& detections = result.frame.detections;
   console.out() << fmt::format("{}: {} marker{}, {:.3f} ms\n", image, detections.size(),
                                detections.size() == 1 ? "" : "s", ms_of(result.cpu_ns));
-  for (const Detection& d : detections) {
+  for (std::size_t i = 0; i < detections.size(); ++i) {
+    const Detection& d = detections[i];
     console.out() << fmt::format("  {:<18} {:>4}  hamming {}  margin {:5.1f}  corner 1 ({:.2f}, {:.2f})",
                                  d.family->name, d.id, d.hamming, d.margin, d.corners[0][0], d.corners[0][1]);
     if (d.has_pose) {
@@ -106,6 +113,7 @@ void print_table(Console& console, const std::string& image, const TimedResult& 
       console.out() << fmt::format("  t ({:.4f}, {:.4f}, {:.4f}) m, range {:.4f} m", t[0], t[1], t[2],
                                    std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]));
     }
+    if (systematic[i]) console.out() << range_deviations(d, *systematic[i]);
     console.out() << '\n';
   }
   for (std::size_t i = 0; i < config.bundles.size(); ++i) {
@@ -125,23 +133,29 @@ void warn_of_overflow(Console& console, const std::string& image, const FrameRes
   }
 }
 
-void detect_one(const std::string& path, const DetectOptions& options, Engine& engine, DrawTarget& draw,
-                Console& console) {
+void detect_one(const std::string& path, const DetectOptions& options, const SystematicErrors& errors, Engine& engine,
+                DrawTarget& draw, Console& console) {
   const GrayImage image = read_gray_image(path);
   const TimedResult result = engine.detect(image.view(), {});
   if (result.frame.status == FrameStatus::device_lost) {
     throw Error(path + ": the device was lost during the frame; see berth doctor, or use --backend simd");
   }
   warn_of_overflow(console, path, result.frame);
+  Systematic systematic;
+  for (const Detection& d : result.frame.detections) {
+    const double size_m = marker_size_m(engine.config(), *d.family, d.id);
+    systematic.push_back(errors.of(engine, image.width(), image.height(), size_m, d));
+  }
   if (options.json) {
     Json line = {{"image", path}, {"ms", ms_of(result.cpu_ns)}, {"detections", to_json(result.frame.detections)}};
+    for (std::size_t i = 0; i < systematic.size(); ++i) add_systematic(systematic[i], line["detections"][i]);
     const std::vector<Bundle>& bundles = engine.config().bundles;
     if (!bundles.empty()) line["bundles"] = to_json(result.frame.bundles, bundles);
     const std::vector<DiscPose>& targets = result.frame.disc_targets;
     if (!targets.empty()) line["targets"] = to_json(targets, engine.config().disc_targets);
     console.out() << to_line(line) << '\n';
   } else {
-    print_table(console, path, result, engine.config());
+    print_table(console, path, result, engine.config(), systematic);
   }
   const std::string refusal = engine.pose_refusal(image.width(), image.height());
   if (!refusal.empty()) console.complain(path + ": " + refusal + " (" + options.engine.camera_file + ")");
@@ -160,10 +174,11 @@ void run_detect(const DetectOptions& options, Console& console) {
   }
   const std::vector<std::string> paths = expand(options, console);
   DrawTarget draw(options.draw, paths.size());
+  const SystematicErrors errors(options.engine);
   Engine engine(open_chosen_backends(options.engine), std::move(config), options.engine.camera_fit);
   for (const std::string& path : paths) {
     try {
-      detect_one(path, options, engine, draw, console);
+      detect_one(path, options, errors, engine, draw, console);
     } catch (const Error& error) {
       console.complain(error.what());
     } catch (const std::bad_alloc&) {
@@ -183,6 +198,7 @@ void add_detect(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--draw", options->draw, "write annotated PNGs: a .png file for one image, or a folder")
       ->type_name("OUT");
   add_engine_options(*command, options->engine);
+  add_deviation_options(*command, options->engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
     run_detect(*options, console);

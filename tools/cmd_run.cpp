@@ -4,6 +4,7 @@
 #include "camera/sources.hpp"
 #include "commands.hpp"
 #include "stream.hpp"
+#include "systematic_show.hpp"
 
 namespace berth::cli {
 namespace {
@@ -69,6 +70,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       ->capture_default_str();
   add_pace_options(*command, options->stream.pace);
   add_engine_options(*command, options->stream.engine);
+  add_deviation_options(*command, options->stream.engine);
   add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {

@@ -21,6 +21,9 @@ struct EngineOptions {
   std::string camera_file;
   CameraFit camera_fit = CameraFit::none;
   std::string size;
+  /// One standard deviation of it, and of where edges are seen, px.
+  std::string size_deviation;
+  double edge_deviation = 0;
   /// Files of bundles.
   std::vector<std::string> bundle_files;
   /// Files of targets of discs.

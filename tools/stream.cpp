@@ -18,6 +18,7 @@
 #include "marker_filters.hpp"
 #include "output_file.hpp"
 #include "source_arguments.hpp"
+#include "systematic_show.hpp"
 #include "target_show.hpp"
 #include "trajectory_svg.hpp"
 #include "truth_score.hpp"
@@ -38,7 +39,8 @@ class StreamRun {
         options_(options),
         console_(console),
         people_(options.log == "-" ? console.err() : console.out()),
-        view_(people_, options.log != "-" && console.out_is_terminal(), frames_expected()) {
+        view_(people_, options.log != "-" && console.out_is_terminal(), frames_expected()),
+        errors_(options.engine) {
     if (options.log.empty() || options.log == "-") return;
     log_.open(options.log, std::ios::binary);
     if (!log_) throw Error(options.log + ": the log cannot be written; check the folder and its permissions");
@@ -148,12 +150,14 @@ class StreamRun {
   void gather(const SourceFrame& frame, FrameResult& result, std::int64_t cpu_ns, const PipelineFrame* paced,
               bool first_round) {
     scale_poses(result.detections, frame.truth);
+    find_systematic(frame, result);
     if (options_.filter) filter(frame, result, first_round);
     ++frames_;
     frames_with_markers_ += result.detections.empty() && !any_found(result.disc_targets) ? 0 : 1;
     overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
     if (!options_.log.empty()) {
       Json line = to_json(result, frame.label, cpu_ns, frame.truth);
+      for (std::size_t i = 0; i < systematic_.size(); ++i) add_systematic(systematic_[i], line["detections"][i]);
       if (paced != nullptr) add_times(*paced, line);
       const std::vector<Bundle>& bundles = engine_->config().bundles;
       if (!bundles.empty()) line["bundles"] = to_json(result.bundles, bundles);
@@ -200,6 +204,15 @@ class StreamRun {
     }
     filters_.update(result, engine_->config(), frame.truth);
     if (!frame.truth.empty() && scored) filtered_score_.add(frame.truth, filters_.as_detections());
+  }
+
+  void find_systematic(const SourceFrame& frame, const FrameResult& result) {
+    systematic_.clear();
+    for (const Detection& d : result.detections) {
+      const TruthMarker* marker = in_bundle(d) ? nullptr : truth_of(d, frame.truth);
+      const double size_m = marker != nullptr ? marker->size_m : marker_size_m(engine_->config(), *d.family, d.id);
+      systematic_.push_back(errors_.of(*engine_, frame.image.width(), frame.image.height(), size_m, d));
+    }
   }
 
   void report_difference(const std::string& label, const StageDifference& difference) {
@@ -270,10 +283,12 @@ class StreamRun {
     std::vector<std::string> table;
     const Detection* largest = nullptr;
     std::string brief;
-    for (const Detection& d : result.detections) {
-      // A row fits 80 columns: where there is a pose, the place in the image gives way to it.
-      const std::string place =
+    for (std::size_t i = 0; i < result.detections.size(); ++i) {
+      const Detection& d = result.detections[i];
+      // A row fits 80 columns, without deviations: where there is a pose, the place in the image gives way to it.
+      std::string place =
           d.has_pose ? place_of(d, truth) : fmt::format("({:7.2f}, {:7.2f}) px", d.center[0], d.center[1]);
+      if (systematic_[i]) place += range_deviations(d, *systematic_[i]);
       table.push_back(fmt::format("  {:<14} {:>4}  {}", d.family->name, d.id, place));
       if (largest == nullptr || area_of(d) > area_of(*largest)) {
         largest = &d;
@@ -378,6 +393,8 @@ class StreamRun {
   LiveView view_;
   std::ofstream log_;
   std::optional<Engine> engine_;
+  SystematicErrors errors_;
+  std::vector<std::optional<std::array<double, 36>>> systematic_;  // of the frame's detections
   bool size_given_ = false, refused_ = false, has_truth_ = false;
   std::uint64_t frames_ = 0, frames_with_markers_ = 0, overflows_ = 0, differing_ = 0;
   std::int64_t wall_ns_ = 0, cpu_ns_ = 0;

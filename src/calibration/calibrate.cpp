@@ -185,6 +185,17 @@ std::vector<double> parameters(const CameraModel& camera) {
   return values;
 }
 
+CalibrationDeviation deviation_of(const Calibration& calibration) {
+  const std::vector<double>& all = calibration.deviations;
+  CalibrationDeviation deviation;
+  deviation.fx = all[0];
+  deviation.fy = all[1];
+  deviation.cx = all[2];
+  deviation.cy = all[3];
+  std::copy(all.begin() + 4, all.end(), deviation.distortion.begin());
+  return deviation;
+}
+
 Calibration calibrate(const Board& board, const ViewSet& set, LensModel lens) try {
   Points points = points_of(board, set);
   const auto solve = lens == LensModel::equidistant ? solve_fisheye : solve_brown;

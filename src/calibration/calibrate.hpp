@@ -5,6 +5,7 @@
 
 #include "berth/camera.hpp"
 #include "berth/marker.hpp"
+#include "berth/systematic_covariance.hpp"
 #include "calibration/view_set.hpp"
 #include "target/board.hpp"
 
@@ -34,6 +35,8 @@ struct Calibration {
   std::vector<std::string> objections(const ViewSet& set) const;
 };
 
+/// Its deviations as systematic_covariance takes them.
+CalibrationDeviation deviation_of(const Calibration& calibration);
 /// Names of Calibration::deviations, in order.
 std::vector<std::string> parameter_names(LensModel lens);
 /// Their values.
