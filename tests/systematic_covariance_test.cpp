@@ -2,16 +2,25 @@
 
 #include "berth/systematic_covariance.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "berth/error.hpp"
 #include "sim/geometry.hpp"
+#include "support/command_run.hpp"
 #include "support/noisy_corners.hpp"
+#include "support/scratch_folder.hpp"
 #include "target/marker_pose.hpp"
 
 namespace berth {
 namespace {
+
+using test::CommandRun;
+using test::run_berth;
+using test::ScratchFolder;
+using testing::HasSubstr;
 
 constexpr double kSide_m = 0.08;
 
@@ -84,6 +93,74 @@ TEST(SystematicCovariance, IsNoneOfAnExactCalibration) {
   covariance.fill(1);
   EXPECT_FALSE(systematic_covariance(camera, kSide_m, Detection{}, {}, covariance));
   EXPECT_EQ(covariance[0], 1);
+}
+
+// All sides a tenth of a pixel too far out make a marker of 100 px larger by two thousandths, and so that much nearer.
+TEST(SystematicCovariance, OfEdgesIsARangeToo) {
+  const CameraModel camera = paper_camera();
+  const Pose truth = {sim::rotation(0.02, 0.03, 0.1), {0, 0, camera.fx * kSide_m / 100}};
+  CalibrationDeviation off;
+  off.edge_px = 0.1;
+  std::array<double, 36> covariance{};
+  ASSERT_TRUE(systematic_covariance(camera, kSide_m, marker_at(seen_corners(camera, truth, kSide_m)), off, covariance));
+  EXPECT_NEAR(std::sqrt(covariance[14]) / truth.t[2], 0.002, 0.0001);
+  EXPECT_LT(std::sqrt(covariance[0]), 1e-4 * truth.t[2]);
+}
+
+TEST(CalibrationDeviation, GoesThroughTheCameraFile) {
+  const ScratchFolder folder;
+  const CalibrationDeviation written = deviation();
+  write_camera_info(folder / "cam.yaml", paper_camera(), "camera", written);
+  EXPECT_EQ(read_camera(folder / "cam.yaml").fx, paper_camera().fx);
+  const std::optional<CalibrationDeviation> read = read_calibration_deviation(folder / "cam.yaml");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->fx, written.fx);
+  EXPECT_EQ(read->fy, written.fy);
+  EXPECT_EQ(read->cx, written.cx);
+  EXPECT_EQ(read->cy, written.cy);
+  EXPECT_EQ(read->distortion, written.distortion);
+  write_camera_info(folder / "without.yaml", paper_camera());
+  EXPECT_FALSE(read_calibration_deviation(folder / "without.yaml"));
+}
+
+TEST(CalibrationDeviation, ThatIsNoneIsRefused) {
+  const ScratchFolder folder;
+  const auto complaint = [&](const std::string& field) -> std::string {
+    try {
+      read_calibration_deviation(folder.write("bad.yaml", "image_width: 640\nstandard_deviations: " + field + "\n"));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(complaint("3"), HasSubstr("standard_deviations"));
+  EXPECT_THAT(complaint("{pinhole: [1, 1, 1], distortion: [0, 0, 0, 0]}"), HasSubstr("pinhole"));
+  EXPECT_THAT(complaint("{pinhole: [1, 1, -1, 1], distortion: [0, 0, 0, 0]}"), HasSubstr("pinhole[2]: -1 is below 0"));
+  EXPECT_THAT(complaint("{pinhole: [1, 1, 1, 1]}"), HasSubstr("distortion"));
+}
+
+TEST(CalibrationDeviation, IsPrintedBesideTheFramesOwn) {
+  const ScratchFolder folder;
+  const std::string image = std::string(BERTH_TEST_DATA) + "/tag36h11_7.png";
+  write_camera_info(folder / "cam.yaml", paper_camera(320, 240));
+  const std::vector<std::string> plain = {"detect", "--camera", folder / "cam.yaml", "--size", "0.08", image};
+  EXPECT_THAT(run_berth(plain).out, testing::Not(HasSubstr("systematic")));
+  std::vector<std::string> sized = plain;
+  sized.insert(sized.end(), {"--size-deviation", "0.0008"});
+  EXPECT_THAT(run_berth(sized).out, HasSubstr("mm, systematic ±"));
+  sized.emplace_back("--json");
+  const CommandRun run = run_berth(sized);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json pose = run.lines().at(0)["detections"][0]["pose"];
+  ASSERT_EQ(pose["systematic_covariance"].size(), 36u);
+  // A side that is a hundredth larger is as much further.
+  EXPECT_NEAR(std::sqrt(pose["systematic_covariance"][14].get<double>()), 0.01 * pose["t"][2].get<double>(), 1e-4);
+  write_camera_info(folder / "cam.yaml", paper_camera(320, 240), "camera", deviation());
+  EXPECT_THAT(run_berth(plain).out, HasSubstr("mm, systematic ±"));
+  std::vector<std::string> bad = plain;
+  bad.insert(bad.end(), {"--size-deviation", "-1"});
+  EXPECT_EQ(run_berth(bad).exit_code, 2);
+  EXPECT_THAT(run_berth(bad).err, HasSubstr("--size-deviation"));
 }
 
 }  // namespace
