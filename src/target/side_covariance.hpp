@@ -24,8 +24,9 @@ std::array<double, 4> side_blurs(View2D<const u8> image, const std::array<std::a
 /// How far each corner moves when all sides move outwards by one px. `corners_px` in the paper's order.
 std::array<std::array<double, 2>, 4> outwards(const std::array<std::array<double, 2>, 4>& corners_px);
 
-/// Covariance of the corners where refined sides meet (docs/corners.md), of sides as above and their `blurs_px`.
+/// Covariance of the corners where refined sides meet (docs/corners.md): of sides as above, by how their lines fit and
+/// by their blurs.
 CornerCovariance side_covariance(const std::array<std::array<double, 2>, 4>& corners_px, int border_width,
-                                 const std::array<SideFit, 4>& sides, const std::array<double, 4>& blurs_px);
+                                 const std::array<SideFit, 4>& fits, const std::array<double, 4>& blurs_px);
 
 }  // namespace berth
