@@ -70,6 +70,11 @@ u64 digest_of(const FrameResult& result) {
     for (const double value : bundle.pose.R) hash(digest, value);
     for (const double value : bundle.pose.t) hash(digest, value);
   }
+  for (const DiscPose& target : result.disc_targets) {
+    if (!target.has_pose) continue;
+    for (const double value : target.pose.R) hash(digest, value);
+    for (const double value : target.pose.t) hash(digest, value);
+  }
   for (const StageDigest& stage : result.digests) {
     const std::array<u32, 2> words = {static_cast<u32>(stage.digest), static_cast<u32>(stage.digest >> 32)};
     digest = digest_words(words.data(), words.size(), digest);

@@ -40,7 +40,7 @@ enum class Lap {
   queue,    ///< done on the device until the host takes it up; within `device` where the host must ask for that
   decode,   ///< codes, duplicates
   corners,  ///< the photometric fit, where it was asked for
-  pose,
+  pose,     ///< with targets of discs, those too
   latency,  ///< camera time (mid-exposure) to pose; from the frame's arrival where its clock is not "monotonic"
 };
 constexpr std::size_t kLaps = 7;

@@ -197,7 +197,7 @@ struct Pipeline::Impl {
     lap(Lap::queue) = began_ns - device.done_ns();
     if (slot.result.status != FrameStatus::device_lost) {
       lap(Lap::decode) = slot.result.times[1].ns;
-      lap(Lap::pose) = slot.result.times[2].ns;
+      lap(Lap::pose) = slot.result.times[2].ns + slot.result.times[4].ns;
       if (slot.result.times[3].stage[0] != '\0') lap(Lap::corners) = slot.result.times[3].ns;
     }
     const FrameStamp& stamp = slot.result.stamp;
@@ -319,7 +319,8 @@ PipelineMemory Pipeline::memory() const {
       memory.host_bytes += device->host_bytes();
     }
     memory.host_bytes += sizeof(Slot) + slot.result.detections.capacity() * sizeof(Detection) +
-                         slot.result.bundles.capacity() * sizeof(BundlePose);
+                         slot.result.bundles.capacity() * sizeof(BundlePose) +
+                         slot.result.disc_targets.capacity() * sizeof(DiscPose);
   }
   return memory;
 }
