@@ -23,7 +23,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> corpora = sim::corpus_names();
-  std::vector<std::string> engines = {"simd", "apriltag-d1", "apriltag-d1-tuned", "apriltag-d2-tuned", "aruco"};
+  std::vector<std::string> engines = {"simd",        "apriltag-d1",       "apriltag-d1-tuned",
+                                      "apriltag-d2", "apriltag-d2-tuned", "aruco"};
   std::string images;
   int frames = sim::kCorpusFrames;
   int width = 640;

@@ -27,7 +27,8 @@ constexpr std::size_t kAlignment = 64;
 // are out of the caches. Buffers share chunks that the system may put on pages of 2 MB.
 constexpr std::size_t kHugePage = std::size_t{1} << 21;
 #ifdef BERTH_HOST_SEPARATE_BUFFERS
-constexpr std::size_t kLeastChunk = 0;  // what lies behind a buffer is nobody's, so that a sanitizer sees who goes there
+constexpr std::size_t kLeastChunk =
+    0;  // what lies behind a buffer is nobody's, so that a sanitizer sees who goes there
 #else
 constexpr std::size_t kLeastChunk = kHugePage;
 #endif
@@ -162,7 +163,9 @@ class HostBackend final : public Backend {
       : name_(name), device_(std::move(device)), ops_(ops), pool_(threads) {}
   const char* name() const override { return name_; }
   DeviceInfo device() const override { return device_; }
-  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return std::make_unique<HostBuffer>(memory_, bytes); }
+  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override {
+    return std::make_unique<HostBuffer>(memory_, bytes);
+  }
   std::unique_ptr<Stream> make_stream() override { return std::make_unique<HostStream>(pool_); }
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
     auto plan = std::make_unique<HostPlan>();

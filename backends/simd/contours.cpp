@@ -71,8 +71,9 @@ struct WalkMemory {
 };
 
 // A walk ends on a node that an earlier one has seen, for then an earlier top is on the contour; above its top's row,
-// for the same reason; and on its own first node. So no node is walked over twice, but for what two walks on one contour
-// do until the later of them comes upon the earlier's first node: at any time only the first top's walk can come round.
+// for the same reason; and on its own first node. So no node is walked over twice, but for what two walks on one
+// contour do until the later of them comes upon the earlier's first node: at any time only the first top's walk can
+// come round.
 HWY_INLINE bool is_end(std::ptrdiff_t id, const u32* stamps, u32 stamp, u32 row_begin) {
   return (stamps[id] <= stamp) | (static_cast<u32>(id) < row_begin);
 }
@@ -285,8 +286,7 @@ void contour_measure(const contour_measure_params& p, const u32* nodes, const u3
   memory.make_room(p, static_cast<std::size_t>(std::min(p.max_side, p.height)) * 5 / 2 + 4);
   u32* const row_begins = memory.row_begins.data();
   for (int y = 0; y <= p.height; ++y) row_begins[y] = reference::run_ends_before(offsets, p.base_at, y * p.row_words);
-  const u32* const fitting =
-      std::upper_bound(row_begins, row_begins + p.height + 1, static_cast<u32>(p.capacity)) - 1;
+  const u32* const fitting = std::upper_bound(row_begins, row_begins + p.height + 1, static_cast<u32>(p.capacity)) - 1;
   const int kept = static_cast<int>(*fitting);
   std::memset(spans, 0, static_cast<std::size_t>(p.groups) * kGroupSize * sizeof(u32));
   std::memset(spans + p.totals_at, 0, static_cast<std::size_t>(p.groups) * sizeof(u32));

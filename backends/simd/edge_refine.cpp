@@ -55,8 +55,8 @@ struct Strip {
   s32 place[kStations];     // of the first pixel, -1 where the strip leaves the image
 };
 
-// All stations at once: where they are, then their pixels (by scalars), then their edges. Quotients are had from doubles,
-// exactly: both numbers have less than 31 bits, and so far from a whole number no quotient is rounded to it.
+// All stations at once: where they are, then their pixels (by scalars), then their edges. Quotients are had from
+// doubles, exactly: both numbers have less than 31 bits, and so far from a whole number no quotient is rounded to it.
 HWY_ATTR void look(const edge_refine_params& p, const u8* pixels, s32 contrast, const Side& side, Stations& seen) {
   const hn::CappedTag<s32, 8> ints;
   const hn::Rebind<u8, decltype(ints)> bytes;
@@ -89,8 +89,8 @@ HWY_ATTR void look(const edge_refine_params& p, const u8* pixels, s32 contrast, 
     const auto v = hn::Add(v_ref, hn::ShiftRight<6>(hn::Mul(slope, hn::Sub(u, hn::Set(ints, side.u_ref)))));
     const auto middle = hn::ShiftRight<9>(hn::Add(v, hn::Set(ints, 256)));
     const auto begin = hn::Sub(middle, hn::Set(ints, reach));
-    const auto in_image = hn::And(hn::And(hn::Gt(begin, hn::Zero(ints)), hn::Lt(middle, last_middle)),
-                                  hn::Lt(line, line_end));
+    const auto in_image =
+        hn::And(hn::And(hn::Gt(begin, hn::Zero(ints)), hn::Lt(middle, last_middle)), hn::Lt(line, line_end));
     const auto place = hn::Add(hn::Mul(line, hn::Set(ints, next_line)),
                                hn::Mul(hn::Sub(begin, hn::Set(ints, 1)), hn::Set(ints, next)));
     hn::StoreU(hn::IfThenElse(in_image, place, hn::Set(ints, -1)), ints, strip.place + k);
@@ -152,8 +152,8 @@ HWY_ATTR void refine(const Stations& seen, const Side& side, s32* edge) {
         const auto rise = hn::ShiftRight<8>(hn::Mul(hn::Set(ints, slope), hn::Sub(u, hn::Set(ints, mean_u))));
         miss = hn::Abs(hn::Sub(hn::Sub(v, hn::Set(ints, value)), rise));
       }
-      const auto counted = hn::And(hn::FirstN(ints, static_cast<std::size_t>(seen.count - i)),
-                                   hn::Lt(miss, hn::Set(ints, 193)));
+      const auto counted =
+          hn::And(hn::FirstN(ints, static_cast<std::size_t>(seen.count - i)), hn::Lt(miss, hn::Set(ints, 193)));
       const auto used_u = hn::IfThenElseZero(counted, u);
       const auto used_v = hn::IfThenElseZero(counted, v);
       counts = hn::Add(counts, hn::IfThenElseZero(counted, hn::Set(ints, 1)));

@@ -232,8 +232,8 @@ class Quad {
     return good && polygon * turn_ > 0 && std::abs(polygon * turn_ - contour) <= slack;
   }
 
-  // Each vertex moves to where its neighbours' chord is farthest; what did not change since the last round is not looked
-  // at again.
+  // Each vertex moves to where its neighbours' chord is farthest; what did not change since the last round is not
+  // looked at again.
   HWY_ATTR bool polish() {
     int looked_from[4] = {-1, -1, -1, -1};
     int looked_to[4];

@@ -17,8 +17,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
 
-/// Words in which overlaps begin: where, the changes of the rows above and here, and the ids of the last run ends before
-/// the word.
+/// Words in which overlaps begin: where, the changes of the rows above and here, and the ids of the last run ends
+/// before the word.
 struct OverlapWords {
   static constexpr int kRoom = 1024;
   static constexpr int kSize = kRoom + kMaxRowWords + kRowSlack;
@@ -48,7 +48,7 @@ struct RowAbove {
 /// Adds the words of a row and the one above to the list of `count`; returns how many it then has. `word`: the first of
 /// the row. `above` becomes this row.
 HWY_NOINLINE int list_overlaps(const u32* row, int row_words, const u32* offsets, int base_at, int word, int count,
-                             RowAbove& above, OverlapWords& list) {
+                               RowAbove& above, OverlapWords& list) {
   const RowTag words;
   const int lanes = row_lanes();
   RightMover right_here, right_both;

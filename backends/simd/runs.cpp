@@ -74,8 +74,8 @@ void run_count(const run_count_params& p, const u32* bits, u32* offsets) {
   }
 }
 
-/// Where the set bits of a word are, added to `first`. Returns the end of what was written; something may lie behind it,
-/// never at or past `limit`.
+/// Where the set bits of a word are, added to `first`. Returns the end of what was written; something may lie behind
+/// it, never at or past `limit`.
 HWY_INLINE u32* emit_word(u32 edges, u32 first, u32* out, const u32* limit) {
 #if HWY_TARGET == HWY_AVX3_DL
   // All 32 places are compressed at once; seldom are there more than sixteen of them.
