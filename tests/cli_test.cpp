@@ -330,6 +330,7 @@ TEST(Run, RefusesAPaceThatCannotBe) {
   EXPECT_THAT(refused({"--fps", "3", "--cores", "70000"}), HasSubstr("core 70000 does not exist"));
   EXPECT_THAT(refused({"--fps", "3", "--lockstep", "simd,cpu"}), HasSubstr("leave --fps out"));
   EXPECT_THAT(refused({"--slots", "4"}), HasSubstr("--fps"));
+  EXPECT_THAT(run_berth({"run", "--source", "v4l2:/dev/video0", "--fps", "30"}).err, HasSubstr("a pace of its own"));
 }
 
 TEST(Demo, FliesFromFirstSightToTheMarker) {

@@ -1,6 +1,7 @@
 // berth run: markers in a stream of frames.
 #include <memory>
 
+#include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
 #include "stream.hpp"
@@ -74,6 +75,9 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
+    if (options->stream.pace.fps != 0 && options->source.rfind("v4l2:", 0) == 0) {
+      throw Error(options->source + ": --fps plays recordings, a camera has a pace of its own; leave --fps out");
+    }
     const std::unique_ptr<Source> source = open_source(options->source);
     exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;
   });

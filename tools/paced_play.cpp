@@ -26,8 +26,7 @@ namespace {
 constexpr const char* kCommandLine = "command line";
 constexpr std::size_t kMostInMemory = 2'000'000'000;
 constexpr std::int64_t kSampleEveryNs = 10'000'000'000;
-constexpr std::array<std::pair<const char*, double>, 3> kQuantiles = {
-    {{"p50", 0.5}, {"p99", 0.99}, {"p99.9", 0.999}}};
+constexpr std::array<std::pair<const char*, double>, 3> kQuantiles = {{{"p50", 0.5}, {"p99", 0.99}, {"p99.9", 0.999}}};
 
 Error bad_option(const char* option, const std::string& value, const std::string& remedy) {
   return bad_field(kCommandLine, option, value, remedy);
@@ -132,8 +131,8 @@ std::vector<SourceFrame> read_to_play(Source& source, std::uint64_t most, Consol
   return frames;
 }
 
-PacedPlay::PacedPlay(std::vector<SourceFrame> frames, const PaceOptions& options,
-                     const std::vector<Backend*>& backends, DetectorConfig detector)
+PacedPlay::PacedPlay(std::vector<SourceFrame> frames, const PaceOptions& options, const std::vector<Backend*>& backends,
+                     DetectorConfig detector)
     : frames_(std::move(frames)),
       options_(options),
       total_(frames_to_play(frames_.size(), options)),
@@ -275,8 +274,8 @@ void PacedPlay::sum_up(std::ostream& out) const {
                        static_cast<double>(*std::min_element(resident_kb_.begin() + at, resident_kb_.end())) / 1e3,
                        static_cast<double>(*std::max_element(resident_kb_.begin() + at, resident_kb_.end())) / 1e3);
   }
-  out << fmt::format("results     {:016x}, {} of {} frames seen, {} results unlike the first of their frame\n", digest(),
-                     frames_seen(), frames_.size(), differing_);
+  out << fmt::format("results     {:016x}, {} of {} frames seen, {} results unlike the first of their frame\n",
+                     digest(), frames_seen(), frames_.size(), differing_);
 }
 
 Json PacedPlay::summary() const {

@@ -36,8 +36,8 @@ PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig d
 std::vector<SourceFrame> read_to_play(Source& source, std::uint64_t most, Console& console,
                                       const InterruptWatch& interrupt);
 
-/// Frames in memory, played in real time into a pipeline by a camera's thread. A frame's camera time is when it was due,
-/// so that a camera held up by a busy machine shows as latency.
+/// Frames in memory, played in real time into a pipeline by a camera's thread. A frame's camera time is when it was
+/// due, so that a camera held up by a busy machine shows as latency.
 class PacedPlay {
  public:
   /// Frames of one size, one at least.
