@@ -1,5 +1,5 @@
-// Where a docking frame's time goes, operation by operation, on the simulator's corpora; and what the worst pictures that
-// anybody could show cost. Processor time of one thread.
+// Where a docking frame's time goes, operation by operation, on the simulator's corpora; and what the worst pictures
+// that anybody could show cost. Processor time of one thread.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -91,7 +91,9 @@ struct Budget {
 class Timer {
  public:
   Timer(const Options& options)
-      : options_(options), memory_(static_cast<std::size_t>(options.evict_mb) << 20), backend_(open_backend(options.backend)) {}
+      : options_(options),
+        memory_(static_cast<std::size_t>(options.evict_mb) << 20),
+        backend_(open_backend(options.backend)) {}
 
   Budget time(const Frames& frames, std::vector<std::string>& order) {
     Detector detector(*backend_, options_.width, options_.height, {});
@@ -143,7 +145,8 @@ class Timer {
   std::unique_ptr<Backend> backend_;
 };
 
-void print_row(const std::string& name, const std::vector<Budget>& budgets, const std::function<double(const Budget&)>& of) {
+void print_row(const std::string& name, const std::vector<Budget>& budgets,
+               const std::function<double(const Budget&)>& of) {
   fmt::print("| {} |", name);
   for (const Budget& budget : budgets) fmt::print(" {:.1f} |", of(budget));
   fmt::print("\n");
