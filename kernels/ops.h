@@ -146,8 +146,9 @@ struct contour_trace_params {
 struct quad_fit_params {
   int max_contours;
   int min_side_px; /* least length of a side, px */
-  int max_width;   /* no contour is wider or higher, px: for devices to choose how they run it */
+  int max_width;   /* of the image, px: no contour is wider or higher, so devices choose by it how they run it */
   int max_height;
+  int margin; /* contours nearer to the image's border are no quadrilaterals, px: 0 where the border is the frame's */
 };
 
 struct edge_refine_params {

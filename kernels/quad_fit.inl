@@ -1,4 +1,5 @@
 // Four corners for a contour, and the line of each side; a work-group a contour.
+// Contours within p.margin pixels of the image's border are left out.
 //   1. The point farthest from the bounding box's centre, and the point farthest from that one.
 //   2. Twice: of the arcs so far, the one whose points lie farthest from its chord is split there.
 //   3. Judged: the polygon's area against the contour's, each side's length, each arc's height over its chord. What
@@ -111,7 +112,10 @@ BODY
       state[FROM_X] = (X_MIN + X_MAX) / 2;
       state[FROM_Y] = (Y_MIN + Y_MAX) / 2;
       state[SEARCH] = FROM_CENTRE;
-      state[DONE] = 0;
+      state[DONE] = min(X_MIN, Y_MIN) < p.margin * 2 || X_MAX > (p.max_width - p.margin) * 2 ||
+                            Y_MAX > (p.max_height - p.margin) * 2
+                        ? 1
+                        : 0;
       state[GOOD] = 0;
     }
     BARRIER;

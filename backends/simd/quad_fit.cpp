@@ -348,6 +348,10 @@ void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, 
     quads[0] = 0;
     if (count < 8) continue;
     loaded.load(points + record[3], count);
+    if (loaded.x_min < p.margin * 2 || loaded.y_min < p.margin * 2 || loaded.x_max > (p.max_width - p.margin) * 2 ||
+        loaded.y_max > (p.max_height - p.margin) * 2) {
+      continue;
+    }
     if (Quad(loaded, count, hole, p.min_side_px).fit(quads)) quads[0] = hole ? QUAD_VALID | QUAD_HOLE : QUAD_VALID;
   }
   for (int slot = filled; slot < p.max_contours; ++slot, quads += QUAD_WORDS) quads[0] = 0;

@@ -67,8 +67,20 @@ struct DetectorConfig {
   /// Per-pixel gain of the flat-field correction, row-major, 1 = unchanged; empty for none.
   std::vector<float> flat_field;
   Capacities capacities;
+  /// Sides of the windows that can be searched in place of the whole frame (SearchWindow), px: multiples of 16 from 64
+  /// to the image's lesser side, each for as many windows of a frame as it is named here. Every one takes memory. Not
+  /// together with disc_targets.
+  std::vector<int> window_sides;
   /// Compute StageDigests for every frame (downloads every stage's output; slow).
   bool digests = false;
+};
+
+/// A square part of a frame that is searched alone (docs/tracking.md): one of DetectorConfig::window_sides, inside the
+/// frame; its upper left pixel at multiples of 8.
+struct SearchWindow {
+  int side = 0;
+  int x = 0;
+  int y = 0;
 };
 
 /// The side that a marker's pose goes by, m: its bundle's, else the configuration's.
@@ -85,11 +97,15 @@ class Detector {
   Detector& operator=(Detector&&) noexcept;
 
   /// Enqueues a frame. Copies the image; returns at once where the device is asynchronous. One frame in flight.
-  void submit(View2D<const u8> image, const FrameStamp& stamp);
+  /// With `windows`, these alone are searched: a marker well inside one of them is found with the bits that the whole
+  /// frame gives it, and no other is reported. The image is then not copied but read until collect returns. Throws
+  /// Error on windows that the detector was not made for or that do not lie in the frame as they must.
+  void submit(View2D<const u8> image, const FrameStamp& stamp, const std::vector<SearchWindow>& windows = {});
   /// Waits for the submitted frame and finishes it on the host. Valid until the next collect.
   const FrameResult& collect();
   /// submit and collect.
-  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {});
+  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {},
+                            const std::vector<SearchWindow>& windows = {});
 
   /// Bytes of device memory, all taken at start.
   std::size_t device_bytes() const;

@@ -15,7 +15,8 @@ class FailoverDetector {
   FailoverDetector(const std::vector<Backend*>& backends, int width, int height, const DetectorConfig& config);
 
   /// FrameStatus::device_lost only when every backend is. Valid until the next call.
-  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {});
+  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {},
+                            const std::vector<SearchWindow>& windows = {});
   /// Which of the backends gave the last result.
   std::size_t active() const { return active_; }
   std::size_t device_bytes() const;

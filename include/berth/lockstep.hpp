@@ -32,7 +32,8 @@ class Lockstep {
   Lockstep& operator=(Lockstep&&) noexcept;
 
   /// The first backend's result; where it lost its device, the second's.
-  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {});
+  const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp = {},
+                            const std::vector<SearchWindow>& windows = {});
   /// Of the frame detected last; none where every bit agrees or a device was lost.
   const std::optional<StageDifference>& difference() const;
   /// Whether either backend has lost its device: from then on nothing is compared.

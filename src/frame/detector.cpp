@@ -10,6 +10,7 @@
 #include "frame/detector_parts.hpp"
 #include "frame/digest.hpp"
 #include "frame/stages.hpp"
+#include "frame/window.hpp"
 #include "target/bent_sides.hpp"
 #include "target/bundle_pose.hpp"
 #include "target/decode.hpp"
@@ -80,16 +81,20 @@ double square_distance(const std::array<double, 2>& a, const std::array<double, 
   return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
 }
 
-/// Whether every corner of a has one of b's within `tolerance` px, whichever comes first.
+/// Whether every corner of a has one of b's within `tolerance` px and the other way round: a small quadrilateral at a
+/// corner of a large one is another.
 bool same_corners(const Corners& a, const Corners& b, double tolerance) {
+  unsigned met = 0;
   for (const auto& corner : a) {
     bool found = false;
-    for (const auto& other : b) {
-      found = found || square_distance(corner, other) < tolerance * tolerance;
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      if (square_distance(corner, b[i]) >= tolerance * tolerance) continue;
+      found = true;
+      met |= 1U << i;
     }
     if (!found) return false;
   }
-  return true;
+  return met == 15;
 }
 
 }  // namespace
@@ -118,20 +123,18 @@ struct HostFinish::Impl {
   }
 
   void reserve(const DeviceFrame& frame, FrameResult& result) {
-    std::size_t slots = 0;
-    for (const SearchResult& search : frame.searches()) slots += static_cast<std::size_t>(search.capacity());
-    result.detections.reserve(slots);
+    result.detections.reserve(frame.most_in_frame());
     result.bundles.resize(bundles.size());
     result.disc_targets.resize(config.disc_targets.size());
-    refused.reserve(slots);
+    found.reserve(frame.most_in_area());
+    refused.reserve(frame.most_in_area());
   }
 
   void finish(DeviceFrame& frame, FrameResult& result) {
     const Clock::time_point on_host = Clock::now();
     clear(result);
-    refused.clear();
-    for (const SearchResult& search : frame.searches()) decode(frame, search, result);
-    resolve_duplicates(result.detections);
+    for (const SearchArea* area : frame.areas()) decode(frame, *area, result);
+    if (frame.areas().size() > 1) resolve_duplicates(result.detections);
     if (is_bending) straighten(result);
     const Clock::time_point decoded = Clock::now();
     if (fit) refine_corners(frame, result);
@@ -152,8 +155,10 @@ struct HostFinish::Impl {
     const bool has_discs = std::any_of(result.disc_targets.begin(), result.disc_targets.end(),
                                        [](const DiscPose& target) { return target.has_pose; });
     result.status = result.detections.empty() && !has_discs ? FrameStatus::no_target : FrameStatus::ok;
-    for (std::size_t i = 0; i < frame.searches().size(); ++i) {
-      frame.searches()[i].note_capacities(&result.capacities[3 * i]);
+    for (const SearchArea* area : frame.areas()) {
+      for (std::size_t i = 0; i < area->searches.size(); ++i) {
+        area->searches[i].note_capacities(&result.capacities[3 * i]);
+      }
     }
     for (const CapacityUse& use : result.capacities) {
       if (use.needed > use.capacity) result.status = FrameStatus::overflow;
@@ -167,24 +172,34 @@ struct HostFinish::Impl {
     std::fill(result.disc_targets.begin(), result.disc_targets.end(), DiscPose{});
     result.digests.clear();
     result.quads = 0;
+    result.capacities = {};
   }
 
-  void decode(DeviceFrame& frame, const SearchResult& search, FrameResult& result) {
-    const View2D<const u8> image = frame.image();
+  /// What the area shows, without what another would have shown otherwise: a window is judged as if it were alone.
+  void decode(const DeviceFrame& frame, const SearchArea& area, FrameResult& result) {
+    found.clear();
+    refused.clear();
+    for (const SearchResult& search : area.searches) decode(frame.submitted(), search, area.place, result);
+    resolve_duplicates(found);
+    for (const Detection& detection : found) {
+      const bool is_frames_own = frame.is_whole(area) || is_well_inside(box_of(detection.corners), area.place);
+      if (is_frames_own) result.detections.push_back(detection);
+    }
+  }
+
+  void decode(View2D<const u8> image, const SearchResult& search, const SearchWindow& place, FrameResult& result) {
     QuadCandidate candidate;
     Detection detection;
     for (int i = 0; i < search.slots(); ++i) {
       bool has_corners = false;
-      if (!search.quad(i, candidate, has_corners)) continue;
+      if (!search.quad(i, place.x, place.y, candidate, has_corners)) continue;
       ++result.quads;
-      if (!has_corners || is_cut_off(candidate, image.width, image.height) || is_known(candidate, result)) {
-        continue;
-      }
+      if (!has_corners || is_cut_off(candidate, image.width, image.height) || is_known(candidate)) continue;
       if (decoder.decode(image, candidate, detection)) {
         if (config.corner_deviation_px > 0) {
           detection.corner_covariance_px2 = independent_corners(config.corner_deviation_px);
         }
-        result.detections.push_back(detection);
+        found.push_back(detection);
       } else {
         refused.push_back(candidate.fine);
       }
@@ -193,12 +208,12 @@ struct HostFinish::Impl {
 
   void find_discs(DeviceFrame& frame, FrameResult& result) {
     discs->clear();
-    for (const SearchResult& search : frame.searches()) search.add_outlines(*discs);
+    for (const SearchResult& search : frame.areas().front()->searches) search.add_outlines(*discs);
     discs->find(frame.image(), result.disc_targets);
   }
 
-  void refine_corners(DeviceFrame& frame, FrameResult& result) {
-    const View2D<const u8> image = frame.image();
+  void refine_corners(const DeviceFrame& frame, FrameResult& result) {
+    const View2D<const u8> image = frame.submitted();
     for (Detection& d : result.detections) {
       if (!fit->refine(image, *d.family, d.id, d.corners, *d.corner_covariance_px2, d.corner_fit.emplace())) {
         d.corner_fit.reset();
@@ -238,8 +253,8 @@ struct HostFinish::Impl {
   }
 
   /// Whether these corners have been decoded or refused already: most quadrilaterals are found by several searches.
-  bool is_known(const QuadCandidate& candidate, const FrameResult& result) const {
-    for (const Detection& known : result.detections) {
+  bool is_known(const QuadCandidate& candidate) const {
+    for (const Detection& known : found) {
       const double side = std::sqrt(square_distance(known.corners[0], known.corners[1]));
       if (same_corners(candidate.fine, known.corners, std::max(1.0, side / 10))) return true;
     }
@@ -250,11 +265,14 @@ struct HostFinish::Impl {
   }
 
   static void take_digests(DeviceFrame& frame, FrameResult& result) {
-    StageReader reader(frame.plan(), frame.stream());
-    const std::vector<Stage>& stages = frame.plan().stages();
-    for (std::size_t i = 0; i < stages.size(); ++i) {
-      const std::vector<u32>& words = reader.read(i);
-      result.digests.push_back({stages[i].name, digest_words(words.data(), words.size())});
+    for (std::size_t k = 0; k < frame.areas().size(); ++k) {
+      MarkerPlan& plan = frame.areas()[k]->plan;
+      const std::string prefix = frame.is_whole(*frame.areas()[k]) ? "" : "window" + std::to_string(k) + "_";
+      StageReader reader(plan, frame.stream());
+      for (std::size_t i = 0; i < plan.stages().size(); ++i) {
+        const std::vector<u32>& words = reader.read(i);
+        result.digests.push_back({prefix + plan.stages()[i].name, digest_words(words.data(), words.size())});
+      }
     }
   }
 
@@ -265,7 +283,8 @@ struct HostFinish::Impl {
   std::optional<PhotometricFit> fit;
   std::optional<DiscFinder> discs;
   bool is_bending = false;       // straight lines in the world are not straight in the image
-  std::vector<Corners> refused;  // candidates of the frame that hold no marker
+  std::vector<Detection> found;  // in the area at hand
+  std::vector<Corners> refused;  // its candidates that hold no marker
 };
 
 HostFinish::HostFinish(int width, int height, const DetectorConfig& config)
@@ -287,13 +306,17 @@ struct Detector::Impl {
     host.reserve(device, result);
   }
 
-  void submit(View2D<const u8> image, const FrameStamp& stamp) {
+  void submit(View2D<const u8> image, const FrameStamp& stamp, const std::vector<SearchWindow>& windows) {
     const MarkerGeometry& g = device.geometry();
     if (image.width != g.width || image.height != g.height) {
       throw Error("frame is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
                   "; this detector was made for " + std::to_string(g.width) + "x" + std::to_string(g.height));
     }
     result.stamp = stamp;
+    if (!windows.empty()) {
+      device.submit_windows(image, windows);
+      return;
+    }
     pad_frame(image, g, device.pixels());
     device.submit();
   }
@@ -325,18 +348,26 @@ Detector::~Detector() = default;
 Detector::Detector(Detector&&) noexcept = default;
 Detector& Detector::operator=(Detector&&) noexcept = default;
 
-void Detector::submit(View2D<const u8> image, const FrameStamp& stamp) { impl_->submit(image, stamp); }
+void Detector::submit(View2D<const u8> image, const FrameStamp& stamp, const std::vector<SearchWindow>& windows) {
+  impl_->submit(image, stamp, windows);
+}
 const FrameResult& Detector::collect() { return impl_->collect(); }
-const FrameResult& Detector::detect(View2D<const u8> image, const FrameStamp& stamp) {
-  submit(image, stamp);
+const FrameResult& Detector::detect(View2D<const u8> image, const FrameStamp& stamp,
+                                    const std::vector<SearchWindow>& windows) {
+  submit(image, stamp, windows);
   return collect();
 }
 std::size_t Detector::device_bytes() const { return impl_->device.device_bytes(); }
 
 std::optional<StageDifference> first_difference(Detector& first, Detector& second) {
-  StageReader a(first.impl_->device.plan(), first.impl_->device.stream());
-  StageReader b(second.impl_->device.plan(), second.impl_->device.stream());
-  return first_difference(a, b);
+  DeviceFrame& one = first.impl_->device;
+  DeviceFrame& two = second.impl_->device;
+  for (std::size_t i = 0; i < one.areas().size(); ++i) {
+    StageReader a(one.areas()[i]->plan, one.stream());
+    StageReader b(two.areas()[i]->plan, two.stream());
+    if (auto difference = first_difference(a, b)) return difference;
+  }
+  return std::nullopt;
 }
 
 }  // namespace berth

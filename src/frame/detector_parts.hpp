@@ -2,42 +2,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "berth/detector.hpp"
-#include "frame/marker_plan.hpp"
-#include "frame/quads.hpp"
+#include "frame/search_area.hpp"
 
 namespace berth {
-
-class DiscFinder;
-
-/// One search's results on the host: in the device's memory where the host reaches it, downloaded otherwise.
-class SearchResult {
- public:
-  /// `with_points`: the contours' points too.
-  SearchResult(const MarkerSearch& search, bool with_points);
-  void download(Stream& stream);
-
-  /// How many slots the frame has filled, and how many there are.
-  int slots() const;
-  int capacity() const { return search_.geometry.max_contours; }
-  /// Whether slot i holds a quadrilateral; `found` tells whether it has four corners.
-  bool quad(int i, QuadCandidate& candidate, bool& found) const;
-  /// Gives the outlines of dark regions to `finder`; only where the points are there.
-  void add_outlines(DiscFinder& finder) const;
-  void note_capacities(CapacityUse* use) const;
-  std::size_t host_bytes() const { return (contours_.size() + quads_.size() + edges_.size() + points_.size()) * 4; }
-
- private:
-  const u32* header() const;
-
-  const MarkerSearch& search_;
-  std::vector<u32> contours_;
-  std::vector<s32> quads_;
-  std::vector<s32> edges_;
-  std::vector<u32> points_;
-};
 
 /// The device's part of a Detector: the plan, its stream, and where one frame's pixels and results lie. Several on one
 /// backend have as many frames in flight. All memory is taken in the constructor.
@@ -48,35 +19,49 @@ class DeviceFrame {
   DeviceFrame(const DeviceFrame&) = delete;
   DeviceFrame& operator=(const DeviceFrame&) = delete;
 
-  const MarkerGeometry& geometry() const { return plan_.geometry(); }
+  const MarkerGeometry& geometry() const { return whole_.plan.geometry(); }
   /// Where the next frame is written, padded as pad_frame does: u8[padded_height, padded_width].
-  u8* pixels() { return staging_.empty() ? static_cast<u8*>(plan_.frame().host()) : staging_.data(); }
+  u8* pixels() { return whole_.pixels(); }
   /// The frame as it was written, without its padding.
   View2D<const u8> image();
+  /// The frame that was submitted: image(), or what submit_windows was given.
+  View2D<const u8> submitted() const { return submitted_; }
 
   /// Enqueues what was written to pixels(), which then stays untouched until finish.
   void submit();
+  /// Enqueues these windows of a frame, which may be image(), and stays untouched until the host is done with it, too.
+  /// Throws Error on windows that there are not or that do not lie in the frame as they must.
+  void submit_windows(View2D<const u8> frame, const std::vector<SearchWindow>& windows);
   /// Waits for the frame. Returns false when the device was lost.
   bool finish();
   /// Runs the plan on whatever the buffers hold, for this thread's first touch of what operations keep by thread.
   bool warm_up();
 
-  const std::vector<SearchResult>& searches() const { return searches_; }
+  /// What was submitted last: the whole frame, or windows.
+  const std::vector<SearchArea*>& areas() const { return areas_; }
+  bool is_whole(const SearchArea& area) const { return &area == &whole_; }
+  /// The most quadrilaterals that one of the areas, and a whole frame or all windows together, can hold.
+  std::size_t most_in_area() const;
+  std::size_t most_in_frame() const;
   /// From submit until the device was done, as far as the host has seen: where work is done while it is enqueued, the
   /// end of submit, else that of finish. ns, monotonic.
   std::int64_t submitted_ns() const { return submitted_ns_; }
   std::int64_t done_ns() const { return done_ns_; }
 
-  MarkerPlan& plan() { return plan_; }
   Stream& stream() { return *stream_; }
-  std::size_t device_bytes() const { return plan_.device_bytes(); }
+  std::size_t device_bytes() const;
   std::size_t host_bytes() const;
 
  private:
-  MarkerPlan plan_;
+  void make_windows(Backend& backend, const DetectorConfig& config);
+  SearchArea& free_area(const SearchWindow& window);
+
+  SearchArea whole_;
+  std::vector<std::unique_ptr<SearchArea>> windows_;
+  std::optional<FrameLevels> levels_;  // where there are windows
+  std::vector<SearchArea*> areas_;
+  View2D<const u8> submitted_;
   std::unique_ptr<Stream> stream_;
-  std::vector<u8> staging_;  // empty where the host reaches the device's memory
-  std::vector<SearchResult> searches_;
   std::int64_t submitted_ns_ = 0, done_ns_ = 0;
 };
 

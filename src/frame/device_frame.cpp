@@ -3,67 +3,47 @@
 
 #include "berth/error.hpp"
 #include "frame/detector_parts.hpp"
+#include "frame/window.hpp"
 #include "monotonic.hpp"
-#include "target/disc_finder.hpp"
 
 namespace berth {
+namespace {
 
-SearchResult::SearchResult(const MarkerSearch& search, bool with_points) : search_(search) {
-  if (search.quads->host() != nullptr) return;
-  if (with_points) points_.resize(search.points->bytes() / 4);
-  contours_.resize(search.contours->bytes() / 4);
-  quads_.resize(search.quads->bytes() / 4);
-  edges_.resize(search.edges->bytes() / 4);
+std::size_t slots_of(const SearchArea& area) {
+  std::size_t slots = 0;
+  for (const SearchResult& search : area.searches) slots += static_cast<std::size_t>(search.capacity());
+  return slots;
 }
 
-void SearchResult::download(Stream& stream) {
-  if (quads_.empty()) return;
-  stream.download(*search_.contours, contours_.data(), contours_.size() * 4);
-  stream.download(*search_.quads, quads_.data(), quads_.size() * 4);
-  stream.download(*search_.edges, edges_.data(), edges_.size() * 4);
-  if (!points_.empty()) stream.download(*search_.points, points_.data(), points_.size() * 4);
-}
-
-const u32* SearchResult::header() const {
-  return contours_.empty() ? static_cast<const u32*>(search_.contours->host()) : contours_.data();
-}
-
-int SearchResult::slots() const {
-  return static_cast<int>(std::min(header()[1], static_cast<u32>(search_.geometry.max_contours)));
-}
-
-bool SearchResult::quad(int i, QuadCandidate& candidate, bool& found) const {
-  const s32* quad = (quads_.empty() ? static_cast<const s32*>(search_.quads->host()) : quads_.data()) + i * QUAD_WORDS;
-  const s32* edge = (edges_.empty() ? static_cast<const s32*>(search_.edges->host()) : edges_.data()) + i * EDGE_WORDS;
-  if ((quad[0] & QUAD_VALID) == 0) return false;
-  found = to_candidate(quad, edge, search_.scale, candidate);
-  return true;
-}
-
-void SearchResult::add_outlines(DiscFinder& finder) const {
-  const u32* const points = points_.empty() ? static_cast<const u32*>(search_.points->host()) : points_.data();
-  for (int i = 0; i < slots(); ++i) {
-    const u32* const record = header() + CONTOUR_HEADER + i * CONTOUR_WORDS;
-    if ((record[1] & CONTOUR_HOLE) != 0) continue;
-    finder.add_outline(points + record[3], static_cast<int>(record[1]), search_.scale);
-  }
-}
-
-void SearchResult::note_capacities(CapacityUse* use) const {
-  const MarkerGeometry& g = search_.geometry;
-  use[0] = {search_.capacity_names[0], header()[0], static_cast<u32>(g.max_run_ends)};
-  use[1] = {search_.capacity_names[1], header()[1], static_cast<u32>(g.max_contours)};
-  use[2] = {search_.capacity_names[2], header()[2], static_cast<u32>(g.max_points)};
-}
+}  // namespace
 
 DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config)
-    : plan_(backend, width, height, config), stream_(backend.make_stream()) {
-  if (plan_.frame().host() == nullptr) staging_.resize(plan_.geometry().frame_bytes());
-  for (const MarkerSearch& search : plan_.searches()) searches_.emplace_back(search, !config.disc_targets.empty());
-  if (!staging_.empty() && !warm_up()) {  // not in the first frame's time
+    : whole_(MarkerPlan(backend, width, height, config), !config.disc_targets.empty()), stream_(backend.make_stream()) {
+  make_windows(backend, config);
+  areas_.reserve(windows_.size() + 1);
+  areas_.push_back(&whole_);
+  if (whole_.is_staged() && !warm_up()) {  // not in the first frame's time
     throw Error(std::string(backend.name()) + ": " + backend.device().name +
                 " was lost on the first, empty frame; see berth doctor, or use another backend");
   }
+}
+
+void DeviceFrame::make_windows(Backend& backend, const DetectorConfig& config) {
+  const MarkerGeometry& g = geometry();
+  if (!config.window_sides.empty() && !config.disc_targets.empty()) {
+    throw Error("windows show markers alone; targets of discs and rings are looked for in whole frames");
+  }
+  for (const int side : config.window_sides) {
+    if (side % 16 != 0 || side < 64 || side > std::min(g.width, g.height)) {
+      throw Error("window side " + std::to_string(side) + " is none for " + std::to_string(g.width) + "x" +
+                  std::to_string(g.height) + "; give a multiple of 16 from 64 to the image's lesser side");
+    }
+    windows_.push_back(std::make_unique<SearchArea>(MarkerPlan::of_window(backend, side, config)));
+    windows_.back()->place.side = side;
+  }
+  if (windows_.empty()) return;
+  levels_.emplace(g, whole_.plan.searches()[1].geometry,
+                  config.flat_field.empty() ? std::vector<u32>() : pack_gains(config.flat_field, g));
 }
 
 View2D<const u8> DeviceFrame::image() {
@@ -73,26 +53,79 @@ View2D<const u8> DeviceFrame::image() {
 
 void DeviceFrame::submit() {
   submitted_ns_ = monotonic_ns();
-  if (!staging_.empty()) stream_->upload(plan_.frame(), staging_.data(), staging_.size());
-  stream_->replay(plan_.plan());
-  for (SearchResult& search : searches_) search.download(*stream_);
-  if (staging_.empty()) done_ns_ = monotonic_ns();
+  areas_.clear();
+  areas_.push_back(&whole_);
+  submitted_ = image();
+  whole_.enqueue(*stream_);
+  if (!whole_.is_staged()) done_ns_ = monotonic_ns();
+}
+
+/// A plan for the window that the frame does not use yet.
+SearchArea& DeviceFrame::free_area(const SearchWindow& window) {
+  const MarkerGeometry& g = geometry();
+  const auto refuse = [&](const std::string& remedy) {
+    throw Error("window of " + std::to_string(window.side) + " px at (" + std::to_string(window.x) + ", " +
+                std::to_string(window.y) + "): " + remedy);
+  };
+  if (window.x < 0 || window.y < 0 || window.x % kWindowStep != 0 || window.y % kWindowStep != 0 ||
+      window.x + window.side > g.width || window.y + window.side > g.height) {
+    refuse("give multiples of " + std::to_string(kWindowStep) + " that keep it in the frame of " +
+           std::to_string(g.width) + "x" + std::to_string(g.height));
+  }
+  const auto free = std::find_if(windows_.begin(), windows_.end(), [&](const auto& area) {
+    return area->place.side == window.side && std::find(areas_.begin(), areas_.end(), area.get()) == areas_.end();
+  });
+  if (free == windows_.end()) refuse("name its side in window_sides, as often as a frame needs it");
+  return **free;
+}
+
+void DeviceFrame::submit_windows(View2D<const u8> frame, const std::vector<SearchWindow>& windows) {
+  submitted_ns_ = monotonic_ns();
+  areas_.clear();
+  for (const SearchWindow& window : windows) {
+    SearchArea& area = free_area(window);
+    area.place = window;
+    areas_.push_back(&area);
+  }
+  submitted_ = frame;
+  levels_->measure(frame);
+  for (SearchArea* area : areas_) area->enqueue_window(frame, *levels_, *stream_);
+  if (!whole_.is_staged()) done_ns_ = monotonic_ns();
 }
 
 bool DeviceFrame::finish() {
   const bool alive = stream_->finish();
-  if (!staging_.empty()) done_ns_ = monotonic_ns();
+  if (whole_.is_staged()) done_ns_ = monotonic_ns();
   return alive;
 }
 
 bool DeviceFrame::warm_up() {
-  stream_->replay(plan_.plan());
+  stream_->replay(whole_.plan.plan());
+  for (const auto& window : windows_) stream_->replay(window->plan.plan());
   return stream_->finish();
 }
 
+std::size_t DeviceFrame::most_in_area() const {
+  std::size_t most = slots_of(whole_);
+  for (const auto& window : windows_) most = std::max(most, slots_of(*window));
+  return most;
+}
+
+std::size_t DeviceFrame::most_in_frame() const {
+  std::size_t most = 0;
+  for (const auto& window : windows_) most += slots_of(*window);
+  return std::max(most, slots_of(whole_));
+}
+
+std::size_t DeviceFrame::device_bytes() const {
+  std::size_t bytes = whole_.plan.device_bytes();
+  for (const auto& window : windows_) bytes += window->plan.device_bytes();
+  return bytes;
+}
+
 std::size_t DeviceFrame::host_bytes() const {
-  std::size_t bytes = staging_.size();
-  for (const SearchResult& search : searches_) bytes += search.host_bytes();
+  std::size_t bytes = whole_.host_bytes();
+  for (const auto& window : windows_) bytes += window->host_bytes();
   return bytes;
 }
 

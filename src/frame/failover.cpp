@@ -10,10 +10,11 @@ FailoverDetector::FailoverDetector(const std::vector<Backend*>& backends, int wi
   for (Backend* backend : backends) detectors_.emplace_back(*backend, width, height, config);
 }
 
-const FrameResult& FailoverDetector::detect(View2D<const u8> image, const FrameStamp& stamp) {
-  const FrameResult* result = &detectors_[active_].detect(image, stamp);
+const FrameResult& FailoverDetector::detect(View2D<const u8> image, const FrameStamp& stamp,
+                                            const std::vector<SearchWindow>& windows) {
+  const FrameResult* result = &detectors_[active_].detect(image, stamp, windows);
   while (result->status == FrameStatus::device_lost && active_ + 1 < detectors_.size()) {
-    result = &detectors_[++active_].detect(image, stamp);
+    result = &detectors_[++active_].detect(image, stamp, windows);
   }
   return *result;
 }

@@ -37,9 +37,10 @@ Lockstep::~Lockstep() = default;
 Lockstep::Lockstep(Lockstep&&) noexcept = default;
 Lockstep& Lockstep::operator=(Lockstep&&) noexcept = default;
 
-const FrameResult& Lockstep::detect(View2D<const u8> image, const FrameStamp& stamp) {
-  impl_->first.submit(image, stamp);
-  impl_->second.submit(image, stamp);
+const FrameResult& Lockstep::detect(View2D<const u8> image, const FrameStamp& stamp,
+                                    const std::vector<SearchWindow>& windows) {
+  impl_->first.submit(image, stamp, windows);
+  impl_->second.submit(image, stamp, windows);
   const FrameResult& first = impl_->first.collect();
   const FrameResult& second = impl_->second.collect();
   impl_->difference.reset();

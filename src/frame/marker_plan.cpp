@@ -12,8 +12,6 @@ namespace berth {
 namespace {
 
 constexpr int kMaxSide = 16384;
-constexpr int kHistogramGroups = 2;
-constexpr int kHistogramStep = 8;
 
 // What a contour and a quadrilateral must have to be worth a look; px. A 12 px marker tilted by 60° is 6 px wide.
 constexpr int kMinContourSide = 5;
@@ -21,12 +19,6 @@ constexpr int kMinContourArea = 24;
 constexpr int kMinQuadSide = 4;
 // Extents that keep the cross products of quad_fit in 32 bits.
 constexpr int kMaxContourSide = 16000;
-
-// Levels of the tiles (docs/marker-pipeline.md): black and white at the 1st and 99th percentile, noise at the 25th of
-// the ranges. A tile must have 4 % of the frame's contrast and 2.5 times its noise; 18 grey levels at least in the
-// whole image, 5 in the halved one, which sees the rest with half the noise.
-constexpr normalize_params kNormalizeWhole = {kHistogramGroups, 10, 990, 250, 40, 40, 18, 40};
-constexpr normalize_params kNormalizeHalf = {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40};
 
 // Where black ends between a neighbourhood's extremes, q8.
 constexpr int kMiddle = 128;
@@ -45,7 +37,17 @@ int capacity(const char* what, int wanted, long long by_area, int low, int high)
   return wanted;
 }
 
-/// Gains as flat_field reads them: two u16 q12 a word, padded like the frame.
+/// A window's lists: no contour has more points than there are run ends.
+DetectorConfig window_config(int side, DetectorConfig config) {
+  if (config.capacities.points == 0) {
+    config.capacities.points = clamp(static_cast<long long>(side) * side / 4, 4096, 1 << 22);
+  }
+  if (config.capacities.contours == 0) config.capacities.contours = clamp(side * side / 256, 64, 4096);
+  return config;
+}
+
+}  // namespace
+
 std::vector<u32> pack_gains(const std::vector<float>& gains, const MarkerGeometry& g) {
   const std::size_t width = static_cast<std::size_t>(g.width);
   const std::size_t stride = static_cast<std::size_t>(g.padded_width);
@@ -69,8 +71,6 @@ std::vector<u32> pack_gains(const std::vector<float>& gains, const MarkerGeometr
   return packed;
 }
 
-}  // namespace
-
 MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capacities& wanted)
     : width(image_width), height(image_height) {
   if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
@@ -93,7 +93,14 @@ MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capaciti
 }
 
 MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config)
-    : backend_(backend), buffers_(backend) {
+    : MarkerPlan(backend, width, height, config, false) {}
+
+MarkerPlan MarkerPlan::of_window(Backend& backend, int side, const DetectorConfig& config) {
+  return MarkerPlan(backend, side, side, window_config(side, config), true);
+}
+
+MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config, bool is_window)
+    : backend_(backend), is_window_(is_window), buffers_(backend) {
   const MarkerGeometry whole(width, height, config.capacities);
   const MarkerGeometry half((width + 1) / 2, (height + 1) / 2, config.capacities);
   searches_ = {
@@ -113,9 +120,13 @@ MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorCo
 
 Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
   const MarkerGeometry& g = geometry();
-  const std::vector<u32> packed = pack_gains(gains, g);
-  Buffer* buffer = buffers_.make(packed.size());
-  upload_at_start(backend_, *backend_.make_stream(), *buffer, packed.data(), packed.size() * 4);
+  Buffer* buffer = buffers_.make(g.frame_bytes() / 2);
+  if (is_window_) {
+    gains_ = buffer;
+  } else {
+    const std::vector<u32> packed = pack_gains(gains, g);
+    upload_at_start(backend_, *backend_.make_stream(), *buffer, packed.data(), packed.size() * 4);
+  }
   const int words = static_cast<int>(g.frame_bytes() / 4);
   Buffer* pixels = buffers_.make(g.frame_bytes() / 4);
   steps_.push_back(make_step(flat_field_params{words}, {frame_, buffer, pixels}, words));
@@ -142,10 +153,12 @@ MarkerPlan::Tiles MarkerPlan::add_tiles(std::size_t index, Buffer* pixels, const
   const int words = g.tile_rows * g.tile_row_words;
   const Tiles tiles{buffers_.make(static_cast<std::size_t>(words)), buffers_.make(static_cast<std::size_t>(words)),
                     buffers_.make(4)};
-  Buffer* histograms = buffers_.make(kHistogramGroups * 768);
+  levels_[index] = tiles.levels;
   add_step(make_step(tile_extrema_params{g.tile_row_words, g.tile_rows}, {pixels, tiles.minima, tiles.maxima}, words));
   add_stage(index, "tile_minima", tiles.minima);
   add_stage(index, "tile_maxima", tiles.maxima);
+  if (is_window_) return tiles;  // the frame's levels are not to be had from a part of it
+  Buffer* histograms = buffers_.make(kHistogramGroups * 768);
   add_step(make_step(tile_histogram_params{words, kHistogramStep, kHistogramGroups},
                      {tiles.minima, tiles.maxima, histograms}, kHistogramGroups * kGroupSize));
   add_stage(index, "tile_histogram", histograms);
@@ -215,8 +228,8 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   stage("contour_collect", search.contours);
   run(contour_trace_params{g.max_contours}, {nodes, search.contours, search.points}, g.max_contours);
   stage("contour_trace", search.points, Stage::Length::points);
-  run(quad_fit_params{g.max_contours, kMinQuadSide, g.width, height}, {search.contours, search.points, search.quads},
-      g.max_contours * kGroupSize);
+  run(quad_fit_params{g.max_contours, kMinQuadSide, g.width, height, is_window_ ? kWindowMargin : 0},
+      {search.contours, search.points, search.quads}, g.max_contours * kGroupSize);
   stage("quad_fit", search.quads, Stage::Length::quads);
   run(edge_refine_params{search.scale, whole.width, whole.height, whole.padded_width / 4, g.max_contours},
       {pixels, tiles.levels, search.quads, search.edges}, g.max_contours * kGroupSize);

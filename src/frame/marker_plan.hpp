@@ -47,6 +47,19 @@ struct MarkerSearch {
   Buffer* edges;
 };
 
+/// How the levels of a frame are had (docs/marker-pipeline.md): every kHistogramStep-th word of tiles is counted.
+inline constexpr int kHistogramStep = 8;
+inline constexpr int kHistogramGroups = 2;
+/// Black and white at the 1st and 99th percentile, noise at the 25th of the ranges. A tile must have 4 % of the frame's
+/// contrast and 2.5 times its noise; 18 grey levels at least in the whole image, 5 in the halved one, which sees the
+/// rest with half the noise.
+inline constexpr normalize_params kNormalizeWhole = {kHistogramGroups, 10, 990, 250, 40, 40, 18, 40};
+inline constexpr normalize_params kNormalizeHalf = {kHistogramGroups, 10, 990, 250, 40, 40, 5, 40};
+
+/// How far from a window's border contours must stay, pixels of the image searched: as far they are the frame's
+/// (docs/tracking.md).
+inline constexpr int kWindowMargin = 8;
+
 /// One stage's output, for digests and comparison: the buffer and how many of its words the frame has written.
 struct Stage {
   std::string name;
@@ -64,6 +77,10 @@ class MarkerPlan {
   /// Throws Error on an image size or a capacity out of bounds, an unknown family or a bad flat field.
   MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config);
 
+  /// The plan of a square window: levels() and, where there is a flat field, gains() come with each frame, and contours
+  /// within kWindowMargin of its border are left out (docs/tracking.md).
+  static MarkerPlan of_window(Backend& backend, int side, const DetectorConfig& config);
+
   /// Of the whole image.
   const MarkerGeometry& geometry() const { return searches_.front().geometry; }
   const std::vector<MarkerSearch>& searches() const { return searches_; }
@@ -72,12 +89,17 @@ class MarkerPlan {
 
   /// Where the padded frame goes: u8[padded_height, padded_width].
   Buffer& frame() { return *frame_; }
+  /// What normalize says of the whole (0) and of the halved image (1): u32[4].
+  Buffer& levels(std::size_t scale) { return *levels_[scale]; }
+  /// Where a window's gains go, or null: u16 q12[padded_height, padded_width].
+  Buffer* gains() { return gains_; }
 
   /// Outputs in order of computation.
   const std::vector<Stage>& stages() const { return stages_; }
   std::size_t device_bytes() const { return buffers_.device_bytes(); }
 
  private:
+  MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config, bool is_window);
   Buffer* add_flat_field(const std::vector<float>& gains);
   Buffer* add_halve(Buffer* pixels);
   /// The tiles' extrema and the levels they give, for the search `index` and those after it on the same pixels.
@@ -94,13 +116,20 @@ class MarkerPlan {
   void add_stage(std::size_t index, const char* name, Buffer* buffer, Stage::Length length = Stage::Length::whole);
 
   Backend& backend_;
+  bool is_window_;
   std::vector<MarkerSearch> searches_;
   BufferList buffers_;
   Buffer* frame_ = nullptr;
+  Buffer* gains_ = nullptr;
+  std::array<Buffer*, 2> levels_ = {};
   std::vector<Step> steps_;
   std::vector<Stage> stages_;
   std::unique_ptr<Plan> plan_;
 };
+
+/// Gains as flat_field reads them: two u16 q12 a word, padded like the frame. Throws Error on a wrong number of them or
+/// one outside 0 to 16.
+std::vector<u32> pack_gains(const std::vector<float>& gains, const MarkerGeometry& geometry);
 
 /// Copies an image into a padded frame, repeating its last column and row into the padding.
 void pad_frame(View2D<const u8> image, const MarkerGeometry& geometry, u8* frame);

@@ -42,7 +42,7 @@ constexpr int kMinStations = 4;
 
 }  // namespace
 
-bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& candidate) {
+bool to_candidate(const s32* quad, const s32* edge, int scale, int x, int y, QuadCandidate& candidate) {
   candidate.reversed_border = (quad[0] & QUAD_HOLE) != 0;
   candidate.has_fine = true;
   std::array<Line, 4> coarse{};
@@ -51,9 +51,11 @@ bool to_candidate(const s32* quad, const s32* edge, int scale, QuadCandidate& ca
     const s32* side = quad + QUAD_SIDE + k * QUAD_SIDE_WORDS;
     const s32* refined = edge + k * EDGE_SIDE_WORDS;
     const bool upright = side[0] % 2 == 0;
-    const double u_ref = (side[0] >> 1) * scale;
-    coarse[k] = to_line(upright, u_ref, static_cast<double>(side[1]) * scale, side[2]);
-    fine[k] = to_line(upright, u_ref, refined[0], refined[1]);
+    // The frame's own numbers, added while they are integers: then nothing after depends on where a window lies.
+    const int u_ref = (side[0] >> 1) * scale + 2 * (upright ? y : x);
+    const int v = 512 * (upright ? x : y);
+    coarse[k] = to_line(upright, u_ref, side[1] * scale + v, side[2]);
+    fine[k] = to_line(upright, u_ref, refined[0] + v, refined[1]);
     // Residuals are rounded down to whole 1/512 px.
     candidate.sides[k] = {refined[2], (refined[3] + 0.5) / 512};
     if (refined[2] < kMinStations) candidate.has_fine = false;

@@ -19,13 +19,13 @@ std::int64_t square_distance(Point a, Point b) { return (a.x - b.x) * (a.x - b.x
 /// One contour's way from points to four sides; the steps are those at the top of kernels/quad_fit.inl.
 class QuadFit {
  public:
-  QuadFit(const u32* points, int count, bool hole, int min_side_px)
-      : points_(points), count_(count), turn_(hole ? -1 : 1), min_side_px_(min_side_px) {}
+  QuadFit(const quad_fit_params& p, const u32* points, int count, bool hole)
+      : p_(p), points_(points), count_(count), turn_(hole ? -1 : 1) {}
 
   /// Writes the quadrilateral's words; returns false (and leaves them) when the contour is none.
   bool fit(s32* quad) {
     measure_extent();
-    if (!find_vertices()) return false;
+    if (is_at_border() || !find_vertices()) return false;
     if (!judge()) {
       if (!polish() || !judge()) return false;
     }
@@ -64,6 +64,11 @@ class QuadFit {
       high_ = {std::max(high_.x, point.x), std::max(high_.y, point.y)};
       area_ += is_end(i) ? point.x / 2 : -(point.x / 2);
     }
+  }
+
+  bool is_at_border() const {
+    return low_.x < p_.margin * 2 || low_.y < p_.margin * 2 || high_.x > (p_.max_width - p_.margin) * 2 ||
+           high_.y > (p_.max_height - p_.margin) * 2;
   }
 
   int farthest_from(Point point) const {
@@ -126,7 +131,7 @@ class QuadFit {
       polygon += cross(at(vertices_[0]), a, b);
       const int length = square_root(square_distance(a, b));
       shortest_ = std::min(shortest_, length);
-      if (length < min_side_px_ * 2) good = false;
+      if (length < p_.min_side_px * 2) good = false;
       if (apex(vertices_[k], end_of_arc(k)).height_q4 > 51 + length * 4 / 5) good = false;
     }
     const std::int64_t contour = area_ * turn_ * 8;
@@ -206,10 +211,10 @@ class QuadFit {
     words[4] = s.u_to;
   }
 
+  const quad_fit_params& p_;
   const u32* points_;
   int count_;
   int turn_;
-  int min_side_px_;
   Point low_{}, high_{};
   std::int64_t area_ = 0;
   std::vector<int> vertices_;
@@ -225,7 +230,7 @@ void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, 
     const bool hole = (record[1] & CONTOUR_HOLE) != 0;
     s32* quad = quads + slot * QUAD_WORDS;
     quad[0] = 0;
-    if (count >= 8 && QuadFit(points + record[3], count, hole, p.min_side_px).fit(quad)) {
+    if (count >= 8 && QuadFit(p, points + record[3], count, hole).fit(quad)) {
       quad[0] = hole ? QUAD_VALID | QUAD_HOLE : QUAD_VALID;
     }
   }

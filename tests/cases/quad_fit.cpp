@@ -1,3 +1,5 @@
+#include <cstring>
+
 #include "support/frame_set.hpp"
 #include "support/op_case.hpp"
 #include "support/pictures.hpp"
@@ -35,6 +37,14 @@ std::vector<OpCase> quad_fit_cases() {
     cases.push_back(outline("triangle_" + std::to_string(size), shape(0, size)));
     cases.push_back(outline("disc_" + std::to_string(size), shape(1, size)));
     cases.push_back(outline("bar_" + std::to_string(size), shape(2, size)));
+  }
+  // Outlines end at cracks 8 and size + 8 of size + 16: kept with a margin of 8 px, left out with one of 9.
+  for (const int margin : {8, 9}) {
+    cases.push_back(outline("bar_margin_" + std::to_string(margin), shape(2, 40)));
+    quad_fit_params params;
+    std::memcpy(&params, cases.back().params.data(), sizeof params);
+    params.margin = margin;
+    std::memcpy(cases.back().params.data(), &params, sizeof params);
   }
   return cases;
 }
