@@ -271,6 +271,24 @@ TEST(Run, LogsEveryFrameOfAFolder) {
   EXPECT_EQ(log[2]["digests"], log[0]["digests"]);
 }
 
+TEST(Run, FollowsMarkersInWindowsAndSaysWhere) {
+  const ScratchFolder folder;
+  for (const char* name : {"1.png", "2.png", "3.png"}) std::filesystem::copy_file(kImage, folder / name);
+  const CommandRun run =
+      run_berth({"run", "--source", folder.path(), "--json", folder / "log", "--track", "--full-every", "2"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const std::vector<json> log = CommandRun::json_lines(text_of(folder / "log"));
+  ASSERT_EQ(log.size(), 3u);
+  EXPECT_EQ(log[0]["search"]["why"], "none_held");
+  EXPECT_EQ(log[0]["search"]["whole"], true);
+  EXPECT_EQ(log[2]["search"]["why"], "regular");
+  for (const json& line : log) {
+    EXPECT_EQ(line["search"]["held"], 1);
+    EXPECT_EQ(line["detections"], log[0]["detections"]);
+  }
+  EXPECT_THAT(run.out, HasSubstr("whole: regular"));
+}
+
 TEST(Run, LogOnStandardOutputIsAllThatIsThere) {
   const CommandRun run = run_berth({"run", "--source", "file:" + kImage, "--json", "-"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
