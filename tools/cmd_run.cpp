@@ -15,6 +15,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
   berth run --source dir:recording/ --json - | jq .detections
   berth run --source sim:scenarios/approach.toml --filter --json log.jsonl
+  berth run --source sim:scenarios/track.toml --track --json log.jsonl
   berth run --source sim:scenarios/approach.toml --bundle bundles/approach.yaml
   berth run --source sim:scenarios/port.toml --target targets/port.yaml
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
@@ -66,6 +67,13 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->add_flag("--digests", options->stream.digests, "log a digest of every stage's output (slow)");
   command->add_flag("--filter", options->stream.filter,
                     "poses filtered over time, with velocities, beside the raw ones");
+  command->add_flag("--track", options->stream.track, "search only around the markers held, with the same bits");
+  command
+      ->add_option("--full-every", options->stream.full_every,
+                   "with --track: the whole frame after so many in windows at the latest")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000000))
+      ->default_str(std::to_string(TrackerConfig().full_every));
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str();

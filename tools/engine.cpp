@@ -242,8 +242,9 @@ bool wants_poses(const DetectorConfig& config) {
   return config.marker_size_m > 0 || !config.bundles.empty() || !config.disc_targets.empty();
 }
 
-Engine::Engine(EngineBackends backends, DetectorConfig config, CameraFit fit)
-    : backends_(std::move(backends)), config_(std::move(config)), fit_(fit) {}
+Engine::Engine(EngineBackends backends, DetectorConfig config, CameraFit fit,
+               const std::optional<TrackerConfig>& tracking)
+    : backends_(std::move(backends)), config_(std::move(config)), fit_(fit), tracking_(tracking) {}
 
 std::string Engine::describe() const {
   const auto named = [](Backend& backend) { return std::string(backend.name()) + " on " + backend.device().name; };
@@ -298,12 +299,17 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
     return sized.width == image.width && sized.height == image.height;
   });
   if (known != detectors_.end()) {
+    if (known != detectors_.begin() && known->tracker) known->tracker->reset();
     std::rotate(detectors_.begin(), known, known + 1);
     return detectors_.front();
   }
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
-  const DetectorConfig config = config_for(image.width, image.height);
-  Sized sized{image.width, image.height, nullptr, nullptr};
+  DetectorConfig config = config_for(image.width, image.height);
+  Sized sized{image.width, image.height, nullptr, nullptr, nullptr};
+  if (tracking_) {
+    config.window_sides = tracking_window_sides(image.width, image.height, *tracking_);
+    sized.tracker = std::make_unique<Tracker>(image.width, image.height, *tracking_);
+  }
   const std::vector<Backend*> chain = backends();
   if (backends_.lockstep) {
     sized.pair = std::make_unique<Lockstep>(*chain[0], *chain[1], image.width, image.height, config);
@@ -319,12 +325,13 @@ TimedResult Engine::detect(View2D<const u8> image, const FrameStamp& stamp) {
   Sized& detector = detector_for(image, stamp);
   const auto wall_start = std::chrono::steady_clock::now();
   const std::int64_t cpu_start = process_cpu_ns();
-  const FrameResult& frame = detector.detect(image, stamp);
+  const TrackedFrame* const tracked = detector.tracker ? &detector.tracker->look(detector, image, stamp) : nullptr;
+  const FrameResult& frame = tracked != nullptr ? *tracked->result : detector.detect(image, stamp);
   const std::int64_t cpu_ns = process_cpu_ns() - cpu_start;
   const auto wall = std::chrono::steady_clock::now() - wall_start;
   if (detector.alone) active_ = detector.alone->active();
   return {frame, cpu_ns, std::chrono::duration_cast<std::chrono::nanoseconds>(wall).count(),
-          detector.pair ? detector.pair->difference() : std::nullopt};
+          detector.pair ? detector.pair->difference() : std::nullopt, tracked};
 }
 
 }  // namespace berth::cli

@@ -9,6 +9,7 @@
 
 #include "berth/failover.hpp"
 #include "berth/lockstep.hpp"
+#include "berth/tracker.hpp"
 
 namespace berth::cli {
 
@@ -83,13 +84,17 @@ struct TimedResult {
   std::int64_t wall_ns;
   /// What the two in lockstep differ in.
   std::optional<StageDifference> difference;
+  /// How the frame was searched, where windows are; null otherwise.
+  const TrackedFrame* tracked = nullptr;
 };
 
 /// Detectors for frames of any size, made when a size first comes. A camera of another size gives no pose, unless it is
 /// said how it fits.
 class Engine {
  public:
-  Engine(EngineBackends backends, DetectorConfig config, CameraFit fit = CameraFit::none);
+  /// `tracking`: markers are followed in windows, frame after frame.
+  Engine(EngineBackends backends, DetectorConfig config, CameraFit fit = CameraFit::none,
+         const std::optional<TrackerConfig>& tracking = std::nullopt);
 
   /// Detects; the result is valid until the next call. The detector of a size is warmed up by one detection outside the
   /// timing (first touch of its memory, kernels loaded).
@@ -100,6 +105,8 @@ class Engine {
   /// The camera for frames of this size; none where none was given or it does not fit.
   std::optional<CameraModel> camera_for(int width, int height) const;
 
+  /// What follows markers in the frames of the size that came last; null before the first, or where nothing does.
+  Tracker* tracker() { return detectors_.empty() ? nullptr : detectors_.front().tracker.get(); }
   const DetectorConfig& config() const { return config_; }
   /// The same for frames of one size: without what they can have no pose of.
   DetectorConfig config_for(int width, int height) const;
@@ -118,9 +125,12 @@ class Engine {
     /// One of the two.
     std::unique_ptr<FailoverDetector> alone;
     std::unique_ptr<Lockstep> pair;
+    /// None where nothing is followed.
+    std::unique_ptr<Tracker> tracker;
 
-    const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp) {
-      return pair ? pair->detect(image, stamp) : alone->detect(image, stamp);
+    const FrameResult& detect(View2D<const u8> image, const FrameStamp& stamp,
+                              const std::vector<SearchWindow>& windows = {}) {
+      return pair ? pair->detect(image, stamp, windows) : alone->detect(image, stamp, windows);
     }
   };
   Sized& detector_for(View2D<const u8> image, const FrameStamp& stamp);
@@ -129,6 +139,7 @@ class Engine {
   std::size_t active_ = 0;
   DetectorConfig config_;
   CameraFit fit_;
+  std::optional<TrackerConfig> tracking_;
   /// Most recently used first.
   std::vector<Sized> detectors_;
 };

@@ -105,6 +105,14 @@ Json to_json(const FrameResult& frame, const std::string& label, std::int64_t cp
   return json;
 }
 
+Json to_json(const TrackedFrame& tracked) {
+  Json windows = Json::array();
+  for (const SearchWindow& window : tracked.windows) {
+    windows.push_back({{"x", window.x}, {"y", window.y}, {"side", window.side}});
+  }
+  return {{"whole", tracked.whole}, {"why", name_of(tracked.why)}, {"windows", windows}, {"held", tracked.held}};
+}
+
 std::string to_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 }  // namespace berth::cli

@@ -6,6 +6,7 @@
 
 #include "berth/frame.hpp"
 #include "berth/source.hpp"
+#include "berth/tracker.hpp"
 
 namespace berth::cli {
 
@@ -26,6 +27,9 @@ Json to_json(const TruthTarget& target);
 /// One frame of a stream's log. `label` names the frame in its source; truth and digests only where there are any.
 Json to_json(const FrameResult& frame, const std::string& label, std::int64_t cpu_ns,
              const std::vector<TruthMarker>& truth);
+
+/// How a frame was searched: {"whole","why","windows","held"}.
+Json to_json(const TrackedFrame& tracked);
 
 /// One line without its end. Doubles read back equal; bytes that are no UTF-8 become U+FFFD.
 std::string to_line(const Json& json);

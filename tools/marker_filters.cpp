@@ -22,7 +22,7 @@ void MarkerFilters::update(const FrameResult& frame, const DetectorConfig& confi
     if (!detection.has_pose || tracks_.count(key) != 0 || tracks_.size() == kMost) continue;
     const TruthMarker* marker = truth_of(detection, truth);
     const double size_m = marker != nullptr ? marker->size_m : marker_size_m(config, *detection.family, detection.id);
-    tracks_.emplace(key, Track{PoseFilter(config_for(config, size_m)), detection.family, {}});
+    tracks_.emplace(key, Track{PoseFilter(config_for(config, size_m)), detection.family, {}, size_m});
   }
   poses_.clear();
   for (auto& [key, track] : tracks_) {
@@ -35,6 +35,12 @@ void MarkerFilters::update(const FrameResult& frame, const DetectorConfig& confi
     if (!track.pose.has_pose || seen == nullptr) continue;
     poses_.push_back(*seen);
     poses_.back().pose = track.pose.pose;
+  }
+}
+
+void MarkerFilters::foretell(std::int64_t time_ns, const DetectorConfig& config, Tracker& tracker) const {
+  for (const auto& [key, track] : tracks_) {
+    tracker.expect(*track.family, key.second, *config.camera, track.size_m, track.filter.foretell(time_ns));
   }
 }
 

@@ -8,6 +8,7 @@
 #include "berth/detector.hpp"
 #include "berth/pose_filter.hpp"
 #include "berth/source.hpp"
+#include "berth/tracker.hpp"
 #include "frame_json.hpp"
 
 namespace berth::cli {
@@ -22,6 +23,9 @@ class MarkerFilters {
   /// truth's where it has one.
   void update(const FrameResult& frame, const DetectorConfig& config, const std::vector<TruthMarker>& truth);
 
+  /// Tells a tracker where the markers will be at that time.
+  void foretell(std::int64_t time_ns, const DetectorConfig& config, Tracker& tracker) const;
+
   /// Every marker with a track: family, id, pose, velocity and what is known of them.
   Json to_json() const;
   /// As detections, to be compared with truth.
@@ -32,6 +36,7 @@ class MarkerFilters {
     PoseFilter filter;
     const MarkerFamily* family;
     FilteredPose pose;
+    double size_m;
   };
   std::map<std::pair<std::string, int>, Track> tracks_;
   std::vector<Detection> poses_;

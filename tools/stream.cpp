@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -71,6 +72,7 @@ class StreamRun {
     const GrayImage& first = frames.front().image;
     make_engine(frames.front());
     if (engine_->is_lockstep()) throw Error("--lockstep compares every frame; leave --fps out");
+    if (options_.track) throw Error("--track follows markers frame by frame; leave --fps out");
     refuse_poses(frames.front());
     const DetectorConfig config = engine_->config_for(first.width(), first.height());
     PacedPlay paced(std::move(frames), options_.pace, engine_->backends(), config);
@@ -119,13 +121,21 @@ class StreamRun {
     if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
     if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit);
+    std::optional<TrackerConfig> tracking;
+    if (options_.track) {
+      tracking.emplace();
+      if (options_.full_every > 0) tracking->full_every = options_.full_every;
+    }
+    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking);
     people_ << "backend " << engine_->describe() << '\n';
   }
 
   void handle(const SourceFrame& frame) {
     if (!engine_) make_engine(frame);
     refuse_poses(frame);
+    if (options_.filter && engine_->tracker() != nullptr) {
+      filters_.foretell(frame.stamp.mid_exposure_ns, engine_->config(), *engine_->tracker());
+    }
     const Backend* before = &engine_->backend();
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
     FrameResult result = timed.frame;
@@ -134,6 +144,8 @@ class StreamRun {
                     engine_->describe());
     }
     if (timed.difference) report_difference(frame.label, *timed.difference);
+    tracked_ = timed.tracked;
+    if (tracked_ != nullptr) count_search(*tracked_, timed.cpu_ns);
     wall_ns_ += timed.wall_ns;
     cpu_ns_ += timed.cpu_ns;
     gather(frame, result, timed.cpu_ns, nullptr, true);
@@ -165,6 +177,7 @@ class StreamRun {
       if (!result.disc_targets.empty()) line["targets"] = to_json(result.disc_targets, targets);
       for (const TruthTarget& target : frame.truth_targets) line["truth_targets"].push_back(to_json(target));
       if (options_.filter) line["filtered"] = filters_.to_json();
+      if (tracked_ != nullptr) line["search"] = to_json(*tracked_);
       log() << to_line(line) << '\n';
     }
     if (!frame.truth.empty() && first_round) {
@@ -212,6 +225,25 @@ class StreamRun {
       const TruthMarker* marker = in_bundle(d) ? nullptr : truth_of(d, frame.truth);
       const double size_m = marker != nullptr ? marker->size_m : marker_size_m(engine_->config(), *d.family, d.id);
       systematic_.push_back(errors_.of(*engine_, frame.image.width(), frame.image.height(), size_m, d));
+    }
+  }
+
+  void count_search(const TrackedFrame& tracked, std::int64_t cpu_ns) {
+    Searched& searched = searches_[static_cast<std::size_t>(tracked.why)];
+    ++searched.frames;
+    searched.cpu_ns += cpu_ns;
+  }
+
+  void print_searches() {
+    for (std::size_t i = 0; i < searches_.size(); ++i) {
+      const Searched& searched = searches_[i];
+      if (searched.frames == 0) continue;
+      const SearchReason why = static_cast<SearchReason>(i);
+      people_ << fmt::format(
+          "  {:<24} {} frame{}, {:.3f} ms of processor time each\n",
+          why == SearchReason::held ? std::string("in windows") : fmt::format("whole: {}", name_of(why)),
+          searched.frames, searched.frames == 1 ? "" : "s",
+          ms_of(searched.cpu_ns) / static_cast<double>(searched.frames));
     }
   }
 
@@ -343,6 +375,7 @@ class StreamRun {
       paced->sum_up(people_);
       if (!options_.log.empty()) log() << to_line(paced->summary()) << '\n';
     }
+    print_searches();
     if (has_truth_) score_.print(people_);
     if (has_truth_ && options_.filter) {
       people_ << "filtered over time:\n";
@@ -400,6 +433,13 @@ class StreamRun {
   std::int64_t wall_ns_ = 0, cpu_ns_ = 0;
   TruthScore score_, filtered_score_;
   MarkerFilters filters_;
+  /// What frames that were searched for one reason came to.
+  struct Searched {
+    std::uint64_t frames = 0;
+    std::int64_t cpu_ns = 0;
+  };
+  std::array<Searched, kSearchReasons> searches_;
+  const TrackedFrame* tracked_ = nullptr;  // of the frame at hand
   std::map<MarkerKey, std::vector<Trajectory::Point>> ways_;
   GrayImage picture_;
   std::vector<Detection> picture_detections_;

@@ -22,6 +22,9 @@ struct StreamOptions {
   bool digests = false;
   /// Poses filtered over time, beside the raw ones.
   bool filter = false;
+  /// Markers are followed in windows; every so many frames are searched whole, 0 for the tracker's default.
+  bool track = false;
+  int full_every = 0;
   /// 0 for all.
   std::uint64_t max_frames = 0;
   /// In real time, through a pipeline.
