@@ -4,8 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "berth/error.hpp"
 #include "navigation/candidates.hpp"
+#include "navigation/track.hpp"
+#include "navset/flight.hpp"
 #include "support/pictures.hpp"
 
 namespace berth {
@@ -23,6 +27,16 @@ NavigatorConfig tiny_config() {
   config.threshold_q15 = 17000;
   config.first_threshold_q15 = 17000;
   config.search_threshold_q15 = 16500;
+  config.evidence = 0;  // what it sees is believed at once
+  config.doubt = -8;
+  return config;
+}
+
+/// The network that comes with Berth, which sees the target of simulated flights.
+NavigatorConfig lite_config() {
+  NavigatorConfig config;
+  config.network = std::string(BERTH_SOURCE_DIR) + "/models/lite.berthnet";
+  config.camera = navset::Flight::camera();
   return config;
 }
 
@@ -71,39 +85,62 @@ TEST(Navigator, LooksTheSameOnEveryBackend) {
   for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_EQ(seen[i], seen[0]) << names[i] << " against " << names[0];
 }
 
-TEST(Navigator, FollowsUntilItIsTold) {
-  NavigatorConfig config = tiny_config();
-  config.threshold_q15 = 1;
-  config.first_threshold_q15 = 1;
-  config.search_threshold_q15 = 1;
+TEST(Navigator, BelievesWhatItSawInSomeFramesAndFollowsItUntilItIsTold) {
   const std::unique_ptr<Backend> backend = open_backend("simd");
-  Navigator navigator(*backend, 640, 480, config);
-  const GrayImage image = noise(640, 480, 5);
-  const Sighting first = navigator.look(image.view());
-  EXPECT_EQ(first.status, FrameStatus::ok);
-  EXPECT_FALSE(first.tracked);
-  EXPECT_GT(first.candidates, 0);
-  EXPECT_TRUE(navigator.look(image.view()).tracked);
+  Navigator navigator(*backend, 640, 480, lite_config());
+  const navset::Flight flight(3, 240);
+  int first = -1;
+  for (int i = 0; i < 8; ++i) {
+    const navset::FlightFrame frame = flight.frame(i);
+    const Sighting& s = navigator.look(frame.image.view());
+    EXPECT_EQ(s.tracked, i > 0) << i;
+    EXPECT_EQ(s.candidates > 0, i == 0) << i << ": what is followed needs no search";
+    EXPECT_NE(s.doubted, s.status == FrameStatus::ok) << i;
+    if (s.status != FrameStatus::ok) continue;
+    if (first < 0) first = i;
+    EXPECT_NEAR(static_cast<double>(s.x_q16) / 65536, frame.x, frame.d_px / 4) << i;
+    EXPECT_NEAR(static_cast<double>(s.y_q16) / 65536, frame.y, frame.d_px / 4) << i;
+    EXPECT_NEAR(s.range_m, sim::length(frame.target.t), 1.5) << i;
+  }
+  EXPECT_GE(first, 1) << "one frame is not enough";
+  EXPECT_LE(first, 3);
   navigator.forget();
-  const Sighting again = navigator.look(image.view());
+  const Sighting again = navigator.look(flight.frame(8).image.view());
+  EXPECT_TRUE(again.doubted);
   EXPECT_FALSE(again.tracked);
-  EXPECT_EQ(again.x_q16, first.x_q16);
-  EXPECT_EQ(again.d_q16, first.d_q16);
+  EXPECT_GT(again.candidates, 0);
+}
+
+TEST(Navigator, FindsAgainWhatItLostWhereItWas) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  Navigator navigator(*backend, 640, 480, lite_config());
+  const navset::Flight flight(3, 240);
+  for (int i = 0; i < 4; ++i) navigator.look(flight.frame(i).image.view());
+  const GrayImage dark(640, 480);
+  for (int i = 4; i < 6; ++i) {
+    const Sighting& s = navigator.look(dark.view());
+    EXPECT_EQ(s.status, FrameStatus::no_target) << "no frame has a position that does not show the target";
+    EXPECT_FALSE(s.has_range);
+  }
+  EXPECT_EQ(navigator.look(flight.frame(6).image.view()).status, FrameStatus::ok) << "remembered";
+  for (int i = 7; i < 14; ++i) navigator.look(dark.view());
+  EXPECT_EQ(navigator.look(flight.frame(14).image.view()).status, FrameStatus::no_target) << "forgotten";
 }
 
 TEST(Navigator, AsksMoreOfTheFirstSight) {
-  NavigatorConfig config = tiny_config();
-  config.threshold_q15 = 1;
-  config.search_threshold_q15 = 1;
   const std::unique_ptr<Backend> backend = open_backend("simd");
-  const GrayImage image = noise(640, 480, 5);
-  config.first_threshold_q15 = 1;
-  const int score = Navigator(*backend, 640, 480, config).look(image.view()).score_q15;
-  config.first_threshold_q15 = score + 1;
+  const navset::Flight flight(3, 240);
+  const navset::FlightFrame frame = flight.frame(0);
+  NavigatorConfig config = lite_config();
+  config.first_threshold_q15 = 32768;
   Navigator stricter(*backend, 640, 480, config);
-  EXPECT_EQ(stricter.look(image.view()).status, FrameStatus::no_target);
-  stricter.expect(320, 240, 96);  // what is followed needs less
-  EXPECT_EQ(stricter.look(image.view()).status, FrameStatus::ok);
+  const Sighting first = stricter.look(frame.image.view());
+  EXPECT_FALSE(first.doubted);
+  EXPECT_GT(first.score_q15, config.keep_threshold_q15);
+  stricter.expect(frame.x, frame.y, frame.d_px);  // what is followed needs less
+  const Sighting& s = stricter.look(frame.image.view());
+  EXPECT_EQ(s.status, FrameStatus::ok);
+  EXPECT_LT(s.score_q15, config.first_threshold_q15);
 }
 
 TEST(Navigator, GivesBearingAndRangeThroughTheCamera) {
@@ -131,6 +168,9 @@ TEST(Navigator, RefusesWhatItCannotDo) {
   config.target_diameter_m = 0;
   EXPECT_THAT([&] { Navigator(*backend, 640, 480, config); }, ThrowsMessage<Error>(HasSubstr("target_diameter_m")));
   config = tiny_config();
+  config.doubt = std::nan("");
+  EXPECT_THAT([&] { Navigator(*backend, 640, 480, config); }, ThrowsMessage<Error>(HasSubstr("doubt nan")));
+  config = tiny_config();
   config.network = "no/such.berthnet";
   EXPECT_THAT([&] { Navigator(*backend, 640, 480, config); }, ThrowsMessage<Error>(HasSubstr("no/such.berthnet")));
   Navigator navigator(*backend, 640, 480, tiny_config());
@@ -140,19 +180,100 @@ TEST(Navigator, RefusesWhatItCannotDo) {
 
 TEST(Navigator, LooksFirstWhereItIsToldTo) {
   const std::unique_ptr<Backend> backend = open_backend("simd");
-  NavigatorConfig config = tiny_config();
-  config.threshold_q15 = 1;  // whatever it looks at is a target
-  Navigator navigator(*backend, 640, 480, config);
-  navigator.expect(400, 100, 96);
-  const GrayImage image = noise(640, 480, 3);
-  const Sighting& sighting = navigator.look(image.view());
+  const navset::Flight flight(3, 240);
+  const navset::FlightFrame frame = flight.frame(0);
+  Navigator navigator(*backend, 640, 480, lite_config());
+  navigator.expect(frame.x, frame.y, frame.d_px);
+  const Sighting& sighting = navigator.look(frame.image.view());
+  EXPECT_EQ(sighting.status, FrameStatus::ok);
   EXPECT_TRUE(sighting.tracked);
-  // 256 window pixels at full size, their middle at the place: 400 + 1/2 - 128.
-  EXPECT_EQ(sighting.window, (std::array<s32, 3>{272 * 256, -28 * 256, 256}));
+  EXPECT_EQ(sighting.candidates, 0);
+  // 256 window pixels at full size, their middle at the place.
+  EXPECT_EQ(sighting.window[2], 256);
+  EXPECT_NEAR(sighting.window[0] / 256.0, frame.x + 0.5 - 128, 1);
+  EXPECT_NEAR(sighting.window[1] / 256.0, frame.y + 0.5 - 128, 1);
   navigator.expect(1e300, -1e300, 1e300);
-  EXPECT_NO_THROW(navigator.look(image.view()));
+  EXPECT_NO_THROW(navigator.look(frame.image.view()));
   navigator.forget();
-  EXPECT_FALSE(navigator.look(image.view()).tracked);
+  EXPECT_FALSE(navigator.look(frame.image.view()).tracked);
+}
+
+/// Log-odds in 1/256 and a place, px.
+Reading reading(int logit_q8, int x, int y, int d) {
+  return {logit_q8, {std::int64_t{x} << 16, std::int64_t{y} << 16, std::int64_t{d} << 16}};
+}
+
+constexpr TrackRules kRules = {256, 512, 1024, 3};  // doubt, most, believed, memory
+
+TEST(Track, IsBelievedByEvidenceOfSeveralFrames) {
+  Track sure(kRules);
+  sure.begin(reading(2000, 100, 100, 50));  // counts 512, the most
+  EXPECT_TRUE(sure.alive());
+  EXPECT_FALSE(sure.believed());
+  sure.see(reading(767, 101, 100, 50));  // 511
+  EXPECT_FALSE(sure.believed());
+  sure.see(reading(257, 101, 100, 50));  // 1
+  EXPECT_TRUE(sure.believed());
+  sure.see(reading(-2000, 101, 100, 50));
+  EXPECT_TRUE(sure.believed()) << "only misses end it";
+}
+
+TEST(Track, IsGivenUpWithMoreAgainstItThanForItUnlessBelieved) {
+  Track track(kRules);
+  track.begin(reading(500, 100, 100, 50));  // 244
+  track.see(reading(12, 100, 100, 50));     // -244
+  EXPECT_TRUE(track.alive());
+  track.see(reading(255, 100, 100, 50));
+  EXPECT_FALSE(track.alive());
+  track.begin(reading(500, 100, 100, 50));
+  track.miss();
+  EXPECT_FALSE(track.alive()) << "one miss is enough";
+  track.believe({100 << 16, 100 << 16, 50 << 16});
+  track.miss();
+  track.miss();
+  EXPECT_TRUE(track.believed());
+  track.miss();
+  EXPECT_FALSE(track.alive());
+  EXPECT_FALSE(track.believed());
+}
+
+TEST(Track, FitsWhatIsNearWhereItMovesAndOfItsSize) {
+  Track track(kRules);
+  track.begin(reading(2000, 100, 100, 40));
+  EXPECT_TRUE(track.fits(reading(0, 119, 100, 40).place));
+  EXPECT_FALSE(track.fits(reading(0, 120, 100, 40).place)) << "its radius";
+  EXPECT_FALSE(track.fits(reading(0, 100, 100, 60).place)) << "half as large again";
+  EXPECT_TRUE(track.fits(reading(0, 100, 100, 59).place));
+  EXPECT_TRUE(track.fits(reading(0, 100, 100, 27).place));
+  EXPECT_FALSE(track.fits(reading(0, 100, 100, 26).place));
+  track.see(reading(2000, 108, 92, 40));  // half of the step counts: 4, -4
+  EXPECT_EQ(track.expected().x_q16, 112 << 16);
+  EXPECT_EQ(track.expected().y_q16, 88 << 16);
+  track.believe({108 << 16, 92 << 16, 40 << 16});
+  EXPECT_EQ(track.expected().x_q16, 108 << 16);
+  EXPECT_FALSE(track.fits(reading(0, 137, 92, 40).place));
+  EXPECT_TRUE(track.fits(reading(0, 137, 92, 40).place, true)) << "sure to be one: three times as far";
+  EXPECT_FALSE(track.fits(reading(0, 168, 92, 40).place, true));
+  track.miss();
+  EXPECT_TRUE(track.fits(reading(0, 137, 92, 40).place)) << "a quarter of d further for every miss";
+  track.see(reading(2000, 116, 92, 40));  // 8 px in two frames: 4 a frame, half of it counts
+  EXPECT_EQ(track.expected().x_q16, 118 << 16);
+}
+
+TEST(Track, WindowsAgreeWhereHalfOfThemFit) {
+  Track track(kRules);
+  track.begin(reading(2000, 100, 100, 40));
+  Reading all;
+  ASSERT_TRUE(agreed(track, {reading(100, 98, 100, 40), reading(300, 104, 102, 44)}, -512, all));
+  EXPECT_EQ(all.logit_q8, 200);
+  EXPECT_EQ(all.place.x_q16, 101 << 16);
+  EXPECT_EQ(all.place.y_q16, 101 << 16);
+  EXPECT_EQ(all.place.d_q16, 42 << 16);
+  ASSERT_TRUE(agreed(track, {reading(1000, 98, 100, 40), reading(2000, 300, 100, 40)}, -512, all));
+  EXPECT_EQ(all.logit_q8, 244) << "one that sees it elsewhere speaks against it";
+  EXPECT_EQ(all.place.x_q16, 98 << 16);
+  EXPECT_FALSE(
+      agreed(track, {reading(2000, 98, 100, 40), reading(2000, 300, 100, 40), reading(2000, 300, 99, 40)}, -512, all));
 }
 
 }  // namespace

@@ -54,12 +54,24 @@ class Modes : public ::testing::Test {
   std::string change_;
 };
 
-TEST_F(Modes, NavigationBeginsWithASecondSightingAtTheSamePlace) {
-  EXPECT_EQ(after(10, target(false)), Mode::search) << "each somewhere else";
+TEST_F(Modes, NavigationBeginsWithASighting) {
+  EXPECT_EQ(after(10, nothing()), Mode::search);
   EXPECT_EQ(after(1, target(true)), Mode::navigation);
   EXPECT_THAT(change_, HasSubstr("target is seen"));
   EXPECT_EQ(after(1, target(true)), Mode::navigation);
   EXPECT_EQ(change_, "");
+}
+
+TEST(ModeSwitch, MayAskForMoreSightingsAtOnePlace) {
+  HandOver rules;
+  rules.sighting_frames = 2;
+  ModeSwitch modes(rules);
+  for (int i = 0; i < 10; ++i) {
+    modes.update(target(false));
+    EXPECT_EQ(modes.mode(), Mode::search) << "each somewhere else";
+  }
+  modes.update(target(true));
+  EXPECT_EQ(modes.mode(), Mode::navigation);
 }
 
 TEST_F(Modes, NavigationEndsAfterFiveFramesWithoutATarget) {
@@ -106,6 +118,7 @@ TEST_F(Modes, WhatWasNotLookedForChangesNothing) {
 PilotConfig flight_config() {
   PilotConfig config = cli::flight_pilot(kTiny);
   config.navigator.threshold_q15 = 32769;  // it knows nothing: let it say nothing
+  config.navigator.keep_threshold_q15 = 32769;
   config.navigator.search_threshold_q15 = 32769;
   return config;
 }

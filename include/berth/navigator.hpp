@@ -19,11 +19,16 @@ struct NavigatorConfig {
   std::optional<CameraModel> camera;
   /// Diameter of the sphere around the target, m.
   double target_diameter_m = 0.4;
-  /// Least score where the last frame had the target, Q15.
+  /// Least score where a target was seen in the last frames but is not believed yet, or was lost and found, Q15.
   int threshold_q15 = 16384;
+  /// Least score where a target is followed that is believed, Q15: lower, since so much speaks for it already.
+  int keep_threshold_q15 = 8192;
   /// Least score of what a search found, Q15. Higher: of the hundreds of places in a frame the best is taken, and where
   /// there is no target that is something like it (docs/navigation.md has the figures).
   int first_threshold_q15 = 29491;
+  /// A target is believed once frames running have so much evidence for it: the sum of their log-odds, each less
+  /// `doubt` and at most `most_evidence`. 0 believes the first.
+  double evidence = 4, doubt = 1.5, most_evidence = 2;
   /// Least score of a place in the whole image that is worth a closer look, Q15.
   int search_threshold_q15 = 8192;
   /// One standard deviation of the range, as a share of it: 68 % of the errors of the network that comes with Berth lie
@@ -36,16 +41,18 @@ struct Sighting {
   FrameStamp stamp;
   /// ok, no_target or device_lost.
   FrameStatus status = FrameStatus::no_target;
-  /// Of the best window looked at, Q15.
+  /// Of the windows that it is from, or of the best one looked at, Q15.
   int score_q15 = 0;
   /// Centre of the target and its circumscribed diameter, px of the frame in 1/65536.
   std::int64_t x_q16 = 0;
   std::int64_t y_q16 = 0;
   std::int64_t d_q16 = 0;
-  /// The window that gave them: corner and pixel size in 1/256 px of the frame.
+  /// The window that gave them, of several the first: corner and pixel size in 1/256 px of the frame.
   std::array<s32, 3> window = {};
-  /// Found by following the last frame's, without a search.
+  /// At the place where the frames before had it.
   bool tracked = false;
+  /// Something is there that is not believed yet; status is no_target.
+  bool doubted = false;
   /// Places that the search put forward.
   int candidates = 0;
   /// With a camera: unit vector from it to the target in its frame, distance along it and its standard deviation, m.

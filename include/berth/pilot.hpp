@@ -20,9 +20,9 @@ struct HandOver {
   /// … and ends when it was not read, or was further away than this, in `lost_frames` frames running.
   double navigation_m = 1.7;
   int lost_frames = 5;
-  /// Navigation begins when the network saw the target in so many frames running at one place, and ends when it did not
-  /// see it in `lost_frames`.
-  int sighting_frames = 2;
+  /// Navigation begins when the network saw the target in so many frames running at one place (a first sighting has
+  /// several frames' evidence already, see NavigatorConfig), and ends when it did not see it in `lost_frames`.
+  int sighting_frames = 1;
 };
 
 struct PilotConfig {

@@ -9,6 +9,7 @@
 #include "navigation/candidates.hpp"
 #include "navigation/network_output.hpp"
 #include "navigation/network_plan.hpp"
+#include "navigation/track.hpp"
 
 namespace berth {
 namespace {
@@ -27,6 +28,19 @@ constexpr int kWindowDiameter = 96;
 
 constexpr int kMinStep = 256;
 constexpr int kMaxStep = 2560;
+
+/// Further windows around a place that one window is not sure of are so many of their px off it, right down and left
+/// up.
+constexpr int kAside = 16;
+/// The log-odds of a window that sees the target elsewhere or of another size, at most.
+constexpr int kMisfit_q8 = -512;
+/// A believed target is remembered where it was for so many frames.
+constexpr int kMemoryFrames = 5;
+/// After so many of them something sure elsewhere takes its place.
+constexpr int kDoubtFrames = 2;
+
+/// Log-odds in 1/256.
+int q8(double log_odds) { return static_cast<int>(log_odds * 256); }
 
 int search_step(int height) { return std::clamp(height * 256 / kSearchHeight, kMinStep, kMaxStep); }
 
@@ -59,7 +73,9 @@ struct Navigator::Impl {
         whole{search_corner(width_, search.width()), search_corner(height_, search.height()), step, 0},
         search_sums(search.sums().bytes() / 4),
         close_sums(close.sums().bytes() / 4),
-        candidates(static_cast<std::size_t>(search.grid_width() * search.grid_height())) {
+        candidates(static_cast<std::size_t>(search.grid_width() * search.grid_height())),
+        track({q8(config_.doubt), q8(config_.most_evidence), q8(config_.evidence), kMemoryFrames}) {
+    readings.reserve(kCloseLooks + 1);
     upload_at_start(backend_, *stream, search.windows(), whole.data(), sizeof whole);
   }
 
@@ -71,56 +87,101 @@ struct Navigator::Impl {
     return stream->finish();
   }
 
-  /// The window of the network's side around a place of the frame.
-  std::array<s32, 4> window_at(std::int64_t x_q16, std::int64_t y_q16, std::int64_t d_q16) const {
-    const s32 wide = static_cast<s32>(std::clamp<std::int64_t>(d_q16 / 256 / kWindowDiameter, kMinStep, kMaxStep));
+  /// The window of the network's side around a place of the frame: the target `diameter` px wide in it, its middle
+  /// (right, down) window px from the window's.
+  std::array<s32, 4> window_at(const Place& place, int diameter, int right, int down) const {
+    const s32 wide = static_cast<s32>(std::clamp<std::int64_t>(place.d_q16 / 256 / diameter, kMinStep, kMaxStep));
     const std::int64_t half = static_cast<std::int64_t>(network.side) * wide / 2;
     // On whole pixels of the frame: nothing is resampled where the scale is 1.
-    const auto corner = [half](std::int64_t at_q16) {
-      return static_cast<s32>((at_q16 / 256 + 128 - half) >> 8) * 256;
+    const auto corner = [&](std::int64_t at_q16, int off) {
+      return static_cast<s32>((at_q16 / 256 + 128 - half - off * wide) >> 8) * 256;
     };
-    return {corner(x_q16), corner(y_q16), wide, 0};
+    return {corner(place.x_q16, right), corner(place.y_q16, down), wide, 0};
+  }
+  std::array<s32, 4> window_at(const Place& place) const { return window_at(place, kWindowDiameter, 0, 0); }
+
+  Reading reading(std::size_t k, const std::array<s32, 4>& window) const {
+    const NetworkOutput output =
+        network_output(network, close_sums.data() + k * static_cast<std::size_t>(close.sums_each()));
+    return {output.logit_q8, place_in_frame(output, window.data(), 0, 0)};
   }
 
-  void take(const NetworkOutput& output, const std::array<s32, 4>& window) {
-    if (output.score_q15 <= sighting.score_q15) return;
-    sighting.score_q15 = output.score_q15;
-    const Place place = place_in_frame(output, window.data(), 0, 0);
-    sighting.x_q16 = place.x_q16;
-    sighting.y_q16 = place.y_q16;
-    sighting.d_q16 = place.d_q16;
+  /// What a frame shows, as far as is known.
+  void take(const Reading& reading, const std::array<s32, 4>& window) {
+    sighting.score_q15 = score_of(network, reading.logit_q8);
+    sighting.x_q16 = reading.place.x_q16;
+    sighting.y_q16 = reading.place.y_q16;
+    sighting.d_q16 = reading.place.d_q16;
     sighting.window = {window[0], window[1], window[2]};
   }
 
-  bool follow_last() {
-    const std::array<s32, 4> window = window_at(sighting.x_q16, sighting.y_q16, sighting.d_q16);
-    sighting.score_q15 = 0;
+  /// Runs kCloseLooks windows at once.
+  bool look_closely(const std::array<std::array<s32, 4>, kCloseLooks>& windows) {
+    stream->upload(close.windows(), windows.data(), sizeof windows);
+    return run(close, close_sums);
+  }
+
+  /// Looks where the target was. One window says so if it is sure; else it and others around it together.
+  bool follow_track(bool& seen) {
+    const Place last = track.expected();
+    const std::array<s32, 4> window = window_at(last);
     stream->upload(follow.windows(), window.data(), sizeof window);
     if (!run(follow, close_sums)) return false;
-    take(network_output(network, close_sums.data()), window);
+    readings.assign(1, reading(0, window));
+    Reading all = readings[0];
+    seen = track.fits(all.place) && score_of(network, all.logit_q8) >= config.first_threshold_q15;
+    if (!seen) {
+      const std::array<std::array<s32, 4>, kCloseLooks> others = {window_at(last, kWindowDiameter, kAside, kAside),
+                                                                  window_at(last, kWindowDiameter, -kAside, -kAside),
+                                                                  window_at(last, kWindowDiameter * 4 / 5, 0, 0)};
+      if (!look_closely(others)) return false;
+      for (std::size_t k = 0; k < kCloseLooks; ++k) readings.push_back(reading(k, others[k]));
+      const int least = track.believed() ? config.keep_threshold_q15 : config.threshold_q15;
+      seen = agreed(track, readings, kMisfit_q8, all) && score_of(network, all.logit_q8) >= least;
+    }
+    if (seen) {
+      track.see(all);
+      seen = sighting.tracked = track.alive();
+      take(all, window);
+    } else {
+      sighting.score_q15 = score_of(network, readings[0].logit_q8);
+    }
     return true;
   }
 
-  bool search_frame() {
-    sighting.score_q15 = 0;
+  /// Looks over the whole frame. Where a target was just lost, one near it is the same; elsewhere what is sure begins
+  /// anew, once nothing else is believed.
+  bool search_frame(bool& seen) {
     if (!run(search, search_sums)) return false;
     const std::size_t found = find_candidates(network, search, whole.data(), spacing, search_sums.data(),
                                               config.search_threshold_q15, candidates);
     sighting.candidates = static_cast<int>(found);
     if (found == 0) return true;
-    std::array<s32, 4 * kCloseLooks> windows{};
-    for (std::size_t k = 0; k < kCloseLooks; ++k) {
-      const Place& place = candidates[std::min(k, found - 1)].place;
-      const std::array<s32, 4> window = window_at(place.x_q16, place.y_q16, place.d_q16);
-      std::copy(window.begin(), window.end(), windows.begin() + static_cast<long>(k) * 4);
-    }
-    stream->upload(close.windows(), windows.data(), sizeof windows);
-    if (!run(close, close_sums)) return false;
-    const std::size_t each = static_cast<std::size_t>(close.sums_each());
+    std::array<std::array<s32, 4>, kCloseLooks> windows;
+    for (std::size_t k = 0; k < kCloseLooks; ++k) windows[k] = window_at(candidates[std::min(k, found - 1)].place);
+    if (!look_closely(windows)) return false;
+    std::size_t best = kCloseLooks;
+    bool near = false;
+    Reading chosen;
     for (std::size_t k = 0; k < std::min<std::size_t>(found, kCloseLooks); ++k) {
-      const s32* w = windows.data() + k * 4;
-      take(network_output(network, close_sums.data() + k * each), {w[0], w[1], w[2], 0});
+      const Reading one = reading(k, windows[k]);
+      const int its_score = score_of(network, one.logit_q8);
+      const bool fits = track.believed() && its_score >= config.threshold_q15 &&
+                        track.fits(one.place, its_score >= config.first_threshold_q15);
+      if (best < kCloseLooks && (near != fits ? near : one.logit_q8 <= chosen.logit_q8)) continue;
+      best = k;
+      near = fits;
+      chosen = one;
     }
+    const int score = score_of(network, chosen.logit_q8);
+    if (near) {
+      track.see(chosen);
+      seen = sighting.tracked = true;
+    } else if ((!track.believed() || track.missed() >= kDoubtFrames) && score >= config.first_threshold_q15) {
+      track.begin(chosen);
+      seen = track.alive();
+    }
+    take(chosen, windows[best]);
     return true;
   }
 
@@ -161,6 +222,8 @@ struct Navigator::Impl {
   std::vector<s32> search_sums;
   std::vector<s32> close_sums;
   std::vector<Candidate> candidates;
+  std::vector<Reading> readings;
+  Track track;
   Sighting sighting;
 };
 
@@ -171,6 +234,13 @@ Navigator::Navigator(Backend& backend, int width, int height, const NavigatorCon
   }
   if (!(config.target_diameter_m > 0)) {
     throw Error("target_diameter_m is " + std::to_string(config.target_diameter_m) + "; give metres above 0");
+  }
+  // An order that no NaN is in; the sums stay within 32 bits.
+  if (!(config.evidence >= 0 && config.evidence <= 1000) || !(config.doubt >= -8 && config.doubt <= 8) ||
+      !(config.most_evidence > 0 && config.most_evidence <= 16)) {
+    throw Error("evidence is " + std::to_string(config.evidence) + ", doubt " + std::to_string(config.doubt) +
+                " and most_evidence " + std::to_string(config.most_evidence) +
+                "; give 0 to 1000, -8 to 8, and above 0 to 16");
   }
   impl_ = std::make_unique<Impl>(backend, width, height, config);
   if (impl_->network.heads.geometry == 0) {
@@ -195,30 +265,32 @@ const Sighting& Navigator::look(View2D<const u8> image, const FrameStamp& stamp)
   }
   it.stream->upload(*it.frame, it.padded.data(), it.padded.size());
   sighting.candidates = 0;
-  const bool had_it = sighting.status == FrameStatus::ok;
-  bool alive = !had_it || it.follow_last();
-  sighting.tracked = had_it && alive && sighting.score_q15 >= it.config.threshold_q15;
-  if (alive && !sighting.tracked) alive = it.search_frame();
-  const int least = sighting.tracked ? it.config.threshold_q15 : it.config.first_threshold_q15;
+  sighting.score_q15 = 0;
+  sighting.tracked = false;
+  bool alive = true;
+  bool seen = false;
+  if (it.track.alive()) alive = it.follow_track(seen);
+  if (alive && !seen) {
+    if (!it.track.believed()) it.track.give_up();
+    alive = it.search_frame(seen);
+    if (!seen && it.track.alive()) it.track.miss();
+  }
+  sighting.doubted = seen && !it.track.believed();
   sighting.status = !alive                        ? FrameStatus::device_lost
-                    : sighting.score_q15 >= least ? FrameStatus::ok
+                    : seen && it.track.believed() ? FrameStatus::ok
                                                   : FrameStatus::no_target;
   it.measure();
   return sighting;
 }
 
-void Navigator::forget() { impl_->sighting.status = FrameStatus::no_target; }
+void Navigator::forget() { impl_->track.give_up(); }
 
 void Navigator::expect(double x_px, double y_px, double d_px) {
-  Sighting& sighting = impl_->sighting;
   // What lies far outside is no place to look at, and must not overflow.
   const auto q16 = [](double px) {
     return static_cast<std::int64_t>(std::clamp(px, -2.0 * kMaxSide, 2.0 * kMaxSide) * 65536);
   };
-  sighting.x_q16 = q16(x_px);
-  sighting.y_q16 = q16(y_px);
-  sighting.d_q16 = q16(std::max(1.0, d_px));
-  sighting.status = FrameStatus::ok;
+  impl_->track.believe({q16(x_px), q16(y_px), q16(std::max(1.0, d_px))});
 }
 
 std::size_t Navigator::device_bytes() const {

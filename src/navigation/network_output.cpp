@@ -26,11 +26,15 @@ s32 diameter_q16(s32 e) {
 
 }  // namespace
 
+int score_of(const Network& network, int logit_q8) {
+  return network.logistic[static_cast<std::size_t>(std::clamp(logit_q8, -2048, 2047) + 2048)];
+}
+
 NetworkOutput network_output(const Network& network, const s32* sums) {
   NetworkOutput output;
   const std::int64_t difference = static_cast<std::int64_t>(sums[1]) - sums[0];
-  const s32 z = std::clamp(network.score.apply(difference), -2048, 2047);
-  output.score_q15 = network.logistic[static_cast<std::size_t>(z + 2048)];
+  output.logit_q8 = std::clamp(network.score.apply(difference), -2048, 2047);
+  output.score_q15 = score_of(network, output.logit_q8);
   if (network.heads.geometry == 0) return output;
   output.x_q16 = kMiddleQ16 + network.x.apply(sums[2]);
   output.y_q16 = kMiddleQ16 + network.y.apply(sums[3]);
