@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -127,6 +128,60 @@ TEST(NetworkFile, OfAnUnknownLayerIsRefused) {
   EXPECT_THAT([&] { parse(sealed(bytes)); }, ThrowsMessage<Error>(HasSubstr("layer 1: kind 77 is unknown")));
 }
 
+/// Reads it; what is read must be a network that can be laid out, and be the same when written and read again.
+bool is_read(const Bytes& bytes) {
+  Network network;
+  try {
+    network = parse(bytes);
+  } catch (const Error&) {
+    return false;
+  }
+  EXPECT_EQ(network.shapes(network.side, network.side).size(), network.layers.size() + 1);
+  EXPECT_EQ(network_bytes(network), bytes);
+  return true;
+}
+
+// Every field in turn at values that break sums and products: the CRC fits, so the reader goes as deep as it can.
+TEST(NetworkFile, WithAnyFieldAtItsExtremesIsReadOrRefused) {
+  const Bytes whole = tiny_bytes();
+  const u32 extremes[] = {0, 1, 65, 16384, 0x7fffffffu, 0x80000000u, 0xffffffffu};
+  int read = 0;
+  int refused = 0;
+  // Where the first layers' shapes are, every byte is a beginning; among weights and tables some are.
+  for (std::size_t at = 16; at + 8 <= whole.size(); at += at < 400 ? 1 : 211) {
+    for (const u32 value : extremes) {
+      Bytes bytes = whole;
+      for (std::size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<unsigned char>(value >> (8 * i));
+      ++(is_read(sealed(bytes)) ? read : refused);
+    }
+  }
+  EXPECT_GT(read, 200) << "weights, tables and texts";
+  EXPECT_GT(refused, 700) << "shapes";
+}
+
+// Parts of the file twice, left out or in another's place: layers of the wrong kind or size follow each other.
+TEST(NetworkFile, WithPartsElsewhereIsReadOrRefused) {
+  const Bytes whole = tiny_bytes();
+  std::mt19937 random(11);
+  for (int i = 0; i < 600; ++i) {
+    Bytes bytes = whole;
+    const auto place = [&] { return static_cast<long>(16 + random() % (bytes.size() - 20)); };
+    const long from = place();
+    const long length =
+        std::min<long>(static_cast<long>(1 + random() % 600), static_cast<long>(bytes.size()) - 4 - from);
+    const Bytes part(bytes.begin() + from, bytes.begin() + from + length);
+    if (i % 3 == 0) {
+      bytes.erase(bytes.begin() + from, bytes.begin() + from + length);
+    } else if (i % 3 == 1) {
+      bytes.insert(bytes.begin() + place(), part.begin(), part.end());
+    } else {
+      const long to = std::min(place(), static_cast<long>(bytes.size()) - 4 - length);
+      std::copy(part.begin(), part.end(), bytes.begin() + to);
+    }
+    is_read(sealed(bytes));
+  }
+}
+
 // Any bytes, with a CRC that fits: a network that passes every check or an error; never a crash, never an endless read.
 TEST(NetworkFile, WithRandomDamageIsReadOrRefused) {
   const Bytes whole = tiny_bytes();
@@ -137,11 +192,7 @@ TEST(NetworkFile, WithRandomDamageIsReadOrRefused) {
     const std::size_t near = i % 2 == 0 ? std::size_t{200} : bytes.size();  // where the shapes are, or anywhere
     for (unsigned k = random() % 4; k < 4; ++k) bytes[random() % near] = static_cast<unsigned char>(random());
     if (random() % 8 == 0) bytes.resize(20 + random() % (bytes.size() - 20));
-    try {
-      parse(sealed(bytes));
-    } catch (const Error&) {
-      ++refused;
-    }
+    if (!is_read(sealed(bytes))) ++refused;
   }
   EXPECT_GT(refused, 1000);
 }

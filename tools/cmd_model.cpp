@@ -14,7 +14,11 @@ namespace {
 
 constexpr const char* kExamples = R"(Examples:
   berth model show lite.berthnet
-  berth model show lite.berthnet --json | jq .layers)";
+  berth model show lite.berthnet --json | jq .layers
+
+A network from elsewhere (ONNX) is brought in by a script of Berth's sources, which needs Python with PyTorch and onnx:
+  training/import_onnx.py NET.onnx --calibrate PICTURES --mean 0 --scale 1/255 -o net.berthnet
+training/README.md says which layers it takes.)";
 
 /// What each kind of layer has of its own; what it has not gets no field.
 struct LayerFields {
