@@ -4,12 +4,12 @@
 #include "target/node_block.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <random>
 
+#include "support/instruction_sets.hpp"
 #include "target/pattern_cells.hpp"
 
 namespace berth {
@@ -138,14 +138,7 @@ void compare(const char* target) {
 }
 
 TEST(NodeBlock, IsItsDefinitionOnEveryInstructionSet) {
-  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
-    const std::int64_t target = left & -left;
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    compare(hwy::TargetName(target));
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  test::for_each_instruction_set([](const char* name) { compare(name); });
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include "target/photometric_fit.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <cstring>
@@ -15,6 +14,7 @@
 #include "sim/close_up.hpp"
 #include "sim/render.hpp"
 #include "support/counted_allocations.hpp"
+#include "support/instruction_sets.hpp"
 #include "target/edge_profile.hpp"
 #include "target/marker_pose.hpp"
 
@@ -214,10 +214,7 @@ TEST(PhotometricFit, HasTheBitsItHad) {
   const GrayImage image = sim::Renderer(scene.camera).render(scene);
   const TruthMarker truth = sim::truth(scene).at(0);
   PhotometricFit photometric(scene.camera, scene.camera.width, scene.camera.height);
-  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
-    const std::int64_t target = left & -left;
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  test::for_each_instruction_set([&](const char* name) {
     Corners corners = truth.corners;
     CornerCovariance known;
     CornerFit fit;
@@ -225,10 +222,8 @@ TEST(PhotometricFit, HasTheBitsItHad) {
     EXPECT_TRUE(photometric.refine(image.view(), family("tag36h11"), truth.id, corners, known, fit));
     EXPECT_EQ(test::allocations(), before) << "refine allocates";
     const u64 digest = digest_of(corners);
-    EXPECT_EQ(digest, 0xbd9bb478a5b88659u) << std::hex << "0x" << digest << " on " << hwy::TargetName(target);
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    EXPECT_EQ(digest, 0xbd9bb478a5b88659u) << std::hex << "0x" << digest << " on " << name;
+  });
 }
 
 TEST(PhotometricFit, IsTheDetectorsWhenAskedFor) {

@@ -158,7 +158,8 @@ void run_link(const run_link_params& p, const u32* bits, const u32* offsets, con
   const auto odd = hn::Ne(hn::And(hn::Iota(words, 0), hn::Set(words, 1)), hn::Zero(words));
   const auto steps = hn::IfThenElse(odd, hn::Set(words, 0xffff0000u), hn::Set(words, 0x00010000u));
   int id = 0;
-  for (; id + lanes <= kept; id += lanes) {
+  // Steps that begin with an even id, which not every vector does where it is a single word.
+  for (; lanes > 1 && id + lanes <= kept; id += lanes) {
     hn::StoreU(hn::Or(hn::LoadU(words, cracks + id), steps), words, nodes + id);
   }
   for (; id < kept; ++id) nodes[id] = cracks[id] | (id % 2 == 0 ? 0x00010000u : 0xffff0000u);
