@@ -4,6 +4,11 @@ target_compile_features(berth_options INTERFACE cxx_std_17)
 # No fused multiply-add: the host's doubles are part of the result (docs/arithmetic.md).
 target_compile_options(berth_options INTERFACE -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wconversion
                                                -Wno-sign-conversion)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+  # Highway's SVE has vectors of run-time size, which cannot be members of structures as Berth's are. Processors with SVE
+  # have NEON too.
+  target_compile_definitions(berth_options INTERFACE "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+endif()
 if(BERTH_WERROR)
   target_compile_options(berth_options INTERFACE -Werror)
 endif()

@@ -5,8 +5,6 @@
 
 #include "target/fit_normal.hpp"
 
-// Vectors are members of structures here, which those of run-time size cannot be.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "target/fit_place_simd.cpp"
 #include <hwy/foreach_target.h>

@@ -3,8 +3,6 @@
 
 #include "target/node_block.hpp"
 
-// Vectors are members of structures here, which those of run-time size cannot be.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "target/node_block_simd.cpp"
 #include <hwy/foreach_target.h>
@@ -87,12 +85,9 @@ struct Pieces {
     const V16 linear = hn::Add(product(square, f), look_up(c1, bytes));
     const V16 value = hn::Add(product(linear, f), look_up(c0, bytes));
     const V16 sign = hn::ShiftRight<15>(t);
-    Edge e;
-    e.level = hn::Sub(hn::Xor(value, sign), sign);
-    const V16 slope = hn::Add(linear, product(hn::Add(square, cubic), f));
-    e.slope = hn::Add(slope, slope);
-    e.spread = product(t, e.slope);
-    return e;
+    const V16 half_slope = hn::Add(linear, product(hn::Add(square, cubic), f));
+    const V16 slope = hn::Add(half_slope, half_slope);
+    return {hn::Sub(hn::Xor(value, sign), sign), slope, product(t, slope)};
   }
 
   V16 c0, c1, c2, c3;
