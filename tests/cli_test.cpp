@@ -62,7 +62,9 @@ TEST(Detect, JsonLineHasTheDocumentedFields) {
   EXPECT_GT(line["ms"], 0);
   ASSERT_EQ(line["detections"].size(), 1u);
   const nlohmann::ordered_json& detection = line["detections"][0];
-  EXPECT_THAT(keys_of(detection), ElementsAre("family", "id", "hamming", "margin", "corners", "center"));
+  EXPECT_THAT(keys_of(detection),
+              ElementsAre("family", "id", "hamming", "margin", "corners", "center", "corner_covariance_px2"));
+  EXPECT_EQ(detection["corner_covariance_px2"].size(), 64u);
   EXPECT_EQ(detection["family"], "tag36h11");
   EXPECT_EQ(detection["id"], 7);
   EXPECT_EQ(detection["hamming"], 0);
@@ -273,18 +275,19 @@ TEST(Run, LogsEveryFrameOfAFolder) {
 
 TEST(Run, FollowsMarkersInWindowsAndSaysWhere) {
   const ScratchFolder folder;
-  for (const char* name : {"1.png", "2.png", "3.png"}) std::filesystem::copy_file(kImage, folder / name);
-  const CommandRun run =
-      run_berth({"run", "--source", folder.path(), "--json", folder / "log", "--track", "--full-every", "2"});
+  const CommandRun run = run_berth({"run", "--source", "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml", "--max-frames",
+                                    "4", "--json", folder / "log", "--track", "--full-every", "2"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   const std::vector<json> log = CommandRun::json_lines(text_of(folder / "log"));
-  ASSERT_EQ(log.size(), 3u);
-  EXPECT_EQ(log[0]["search"]["why"], "none_held");
-  EXPECT_EQ(log[0]["search"]["whole"], true);
-  EXPECT_EQ(log[2]["search"]["why"], "regular");
-  for (const json& line : log) {
-    EXPECT_EQ(line["search"]["held"], 1);
-    EXPECT_EQ(line["detections"], log[0]["detections"]);
+  ASSERT_EQ(log.size(), 4u);
+  const char* const why[] = {"none_held", "held", "regular", "held"};
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    const json& search = log[i]["search"];
+    EXPECT_EQ(search["why"], why[i]) << i;
+    EXPECT_EQ(search["whole"], i % 2 == 0) << i;
+    EXPECT_EQ(search["windows"].size(), i % 2) << i;
+    EXPECT_EQ(search["held"], 1) << i;
+    EXPECT_EQ(log[i]["detections"].size(), 1u) << i;
   }
   EXPECT_THAT(run.out, HasSubstr("whole: regular"));
 }

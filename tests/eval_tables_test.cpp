@@ -19,7 +19,10 @@ Judged target(double depth_m, double visible, double d, int score_q15, const Squ
   judged.truth.x = 100;
   judged.truth.y = 100;
   judged.truth.d = d;
-  judged.output = {score_q15, q16(said.x), q16(said.y), q16(said.side)};
+  judged.output.score_q15 = score_q15;
+  judged.output.x_q16 = q16(said.x);
+  judged.output.y_q16 = q16(said.y);
+  judged.output.d_q16 = q16(said.side);
   return judged;
 }
 

@@ -99,8 +99,8 @@ class DrawTarget {
 /// Of each detection, what is off in every frame alike.
 using Systematic = std::vector<std::optional<std::array<double, 36>>>;
 
-void print_table(Console& console, const std::string& image, const TimedResult& result,
-                 const DetectorConfig& config, const Systematic& systematic) {
+void print_table(Console& console, const std::string& image, const TimedResult& result, const DetectorConfig& config,
+                 const Systematic& systematic) {
   const std::vector<Detection>& detections = result.frame.detections;
   console.out() << fmt::format("{}: {} marker{}, {:.3f} ms\n", image, detections.size(),
                                detections.size() == 1 ? "" : "s", ms_of(result.cpu_ns));

@@ -8,6 +8,7 @@
 #include "berth/systematic_covariance.hpp"
 #include "golden/numbers.hpp"
 #include "navigation/window_scorer.hpp"
+#include "navset/flight.hpp"
 #include "sim/corpus.hpp"
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
@@ -183,12 +184,14 @@ std::vector<std::string> network_lines(const Scenes& scenes, Backend& backend, c
   }
   NavigatorConfig config;
   config.network = file;
-  config.camera = scenes.camera;
-  config.threshold_q15 = 1;  // follows whatever is there: one window a frame, where a search takes hundreds
-  Navigator navigator(backend, scenes.camera.width, scenes.camera.height, config);
-  navigator.expect(320, 240, 200);
+  config.camera = navset::Flight::camera();
+  Navigator navigator(backend, config.camera->width, config.camera->height, config);
+  // Told where the target is, it follows: a few windows a frame, where a search takes hundreds.
+  const navset::Flight flight(3, 240);
   for (int i = 0; i < 2; ++i) {
-    write(lines, "navigator " + std::to_string(i), navigator.look(scenes.approach.back().image.view()));
+    const navset::FlightFrame frame = flight.frame(i);
+    if (i == 0) navigator.expect(frame.x, frame.y, frame.d_px);
+    write(lines, "navigator " + std::to_string(i), navigator.look(frame.image.view()));
   }
   return lines.all();
 }
