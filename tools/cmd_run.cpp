@@ -19,6 +19,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml --bundle bundles/approach.yaml
   berth run --source sim:scenarios/port.toml --target targets/port.yaml
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
+  berth run --source v4l2:video0,width=640,height=480,fps=120 --camera cam.yaml --size 0.08 --filter
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops
 
@@ -53,7 +54,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
     std::string source;
     StreamOptions stream;
   };
-  CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image or video");
+  CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image, video or camera");
   const auto options = std::make_shared<Options>();
   command
       ->add_option(

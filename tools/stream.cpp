@@ -66,13 +66,14 @@ class StreamRun {
  private:
   /// At a camera's pace, all frames read beforehand.
   void play(const InterruptWatch& interrupt) {
-    make_pipeline_config(options_.pace, {});  // what is wrong shows before the frames are read
+    // What is wrong shows before the frames are read.
+    make_pipeline_config(options_.pace, {});
+    if (!options_.engine.lockstep.empty()) throw Error("--lockstep compares every frame; leave --fps out");
+    if (options_.track) throw Error("--track follows markers frame by frame; leave --fps out");
     std::vector<SourceFrame> frames = read_to_play(source_, options_.max_frames, console_, interrupt);
     if (frames.empty()) throw Error("the source has no frame to play");
     const GrayImage& first = frames.front().image;
     make_engine(frames.front());
-    if (engine_->is_lockstep()) throw Error("--lockstep compares every frame; leave --fps out");
-    if (options_.track) throw Error("--track follows markers frame by frame; leave --fps out");
     refuse_poses(frames.front());
     const DetectorConfig config = engine_->config_for(first.width(), first.height());
     PacedPlay paced(std::move(frames), options_.pace, engine_->backends(), config);
@@ -360,6 +361,16 @@ class StreamRun {
     return text;
   }
 
+  /// Nothing of files, nor of a camera that went through nothing.
+  void print_camera_health() {
+    const SourceHealth health = source_.health();
+    if (health.lost + health.incomplete + health.skipped + health.reopened == 0) return;
+    people_ << fmt::format(
+        "  camera: {} frames skipped for newer ones, {} lost before they came, {} incomplete; opened "
+        "again {} times\n",
+        health.skipped, health.lost, health.incomplete, health.reopened);
+  }
+
   void sum_up(bool by_interrupt, const PacedPlay* paced = nullptr) {
     if (by_interrupt) people_ << "interrupted\n";
     people_ << fmt::format("{} frame{}, {} with markers", frames_, frames_ == 1 ? "" : "s", frames_with_markers_);
@@ -376,6 +387,7 @@ class StreamRun {
       if (!options_.log.empty()) log() << to_line(paced->summary()) << '\n';
     }
     print_searches();
+    print_camera_health();
     if (has_truth_) score_.print(people_);
     if (has_truth_ && options_.filter) {
       people_ << "filtered over time:\n";

@@ -36,7 +36,7 @@ struct CornerNoise {
   /// Of side k (from corner k to the next) at its ends, across it, px; and what share of that variance moves the whole
   /// side, while the rest turns it about its middle.
   std::array<double, 4> side_end_px = {}, shift_share = {};
-  /// All of it in a corner's coordinate, px: what to give to DetectorConfig::corner_deviation_px.
+  /// All of it in a corner's coordinate, px: as DetectorConfig::corner_deviation_px, where that is not to be measured.
   double corner_px = 0;
 };
 
