@@ -132,6 +132,22 @@ TEST(V4l2, NeverHandsOnADamagedFrame) {
   camera.frames = {frame_of(3, 2)};
   EXPECT_EQ(first_pixel(*source->next()), 3);
   EXPECT_EQ(source->health().incomplete, 2U);
+  // Of an undamaged frame and a newer one that is not whole, the older.
+  damaged.sequence = 4;
+  camera.frames = {frame_of(4, 3), damaged};
+  EXPECT_EQ(first_pixel(*source->next()), 4);
+  EXPECT_EQ(source->health().incomplete, 3U);
+  EXPECT_EQ(source->health().skipped, 0U);
+}
+
+TEST(V4l2, TakesACameraThatGivesNothingWholeForLost) {
+  FakeV4l2 camera;
+  const auto source = open_v4l2(options_of(), opener_of(camera));
+  FakeFrame damaged = frame_of(1, 0);
+  damaged.flags |= V4L2_BUF_FLAG_ERROR;
+  camera.endless = damaged;
+  EXPECT_THAT([&] { source->next(); }, ThrowsMessage<Error>(HasSubstr("no whole frame for 20 ms")));
+  EXPECT_GT(source->health().incomplete, 0U);
 }
 
 TEST(V4l2, OpensACameraAgainThatWentAway) {
@@ -156,7 +172,7 @@ TEST(V4l2, OpensACameraAgainThatWentAway) {
 TEST(V4l2, TakesAFrozenCameraForLost) {
   FakeV4l2 camera;
   const auto source = open_v4l2(options_of(), opener_of(camera));
-  EXPECT_THAT([&] { source->next(); }, ThrowsMessage<Error>(HasSubstr("no frame for 20 ms")));
+  EXPECT_THAT([&] { source->next(); }, ThrowsMessage<Error>(HasSubstr("no whole frame for 20 ms")));
   camera.frames = {frame_of(5, 0)};
   EXPECT_EQ(first_pixel(*source->next()), 5);
   EXPECT_EQ(camera.opened, 2);

@@ -23,6 +23,7 @@ void WorkerPool::share(int groups, const std::function<void(int, int)>& work) {
     work(0, groups);
     return;
   }
+  const std::lock_guard<std::mutex> turn(turn_);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     work_ = &work;

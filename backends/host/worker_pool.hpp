@@ -19,6 +19,7 @@ class WorkerPool {
 
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
   /// Calls work(first, last) for parts of [0, groups) that together make the whole, and returns when all are done.
+  /// May be called by several threads at once, as streams of one backend are: they take turns.
   /// Which thread does which part never changes a result: operations do not depend on the order of their groups.
   void share(int groups, const std::function<void(int, int)>& work);
 
@@ -26,7 +27,8 @@ class WorkerPool {
   void serve(int part);
   void run_part(int part) const;
 
-  std::mutex mutex_;
+  std::mutex turn_;   // held by the caller whose operation the threads are at
+  std::mutex mutex_;  // of what follows
   std::condition_variable start_;
   std::condition_variable done_;
   const std::function<void(int, int)>* work_ = nullptr;

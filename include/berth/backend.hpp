@@ -56,7 +56,8 @@ class Event {
   virtual bool wait() = 0;
 };
 
-/// An in-order queue of copies and plans. Nothing but Event::wait and finish waits on the host.
+/// An in-order queue of copies and plans. Nothing but Event::wait and finish waits on the host. One thread at a time;
+/// streams of one backend may be used by different threads.
 class Stream {
  public:
   virtual ~Stream() = default;

@@ -23,7 +23,7 @@ struct V4l2Options {
   int gain = -1;
   /// Buffers that the driver fills while others are looked at, 2 to 32.
   int buffers = 4;
-  /// Without a frame for this long the camera is closed and opened again.
+  /// Without a whole frame for this long, 1 to 60,000, the camera is closed and opened again.
   int watchdog_ms = 1000;
 };
 

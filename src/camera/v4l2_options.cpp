@@ -68,7 +68,7 @@ void set(V4l2Options& options, const std::string& key, const std::string& value)
   } else if (key == "buffers") {
     options.buffers = whole(key, value, 2, 32);
   } else if (key == "watchdog_ms") {
-    options.watchdog_ms = whole(key, value, 1, 3'600'000);
+    options.watchdog_ms = whole(key, value, 1, 60'000);
   } else {
     refuse(key, value, std::string("the keys are ") + kKeys);
   }

@@ -2,11 +2,11 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <ctime>
 #include <thread>
 
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
+#include "monotonic.hpp"
 
 namespace berth {
 namespace {
@@ -14,15 +14,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// A signal is seen to after this time at the latest.
-constexpr int kSlice_ms = 100;
 constexpr milliseconds kFirstPause{50}, kLongestPause{2000};
-
-std::int64_t monotonic_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 class V4l2Source final : public Source {
  public:
@@ -32,19 +24,24 @@ class V4l2Source final : public Source {
 
   std::optional<SourceFrame> next() override {
     if (!camera_) reopen();
-    for (Clock::time_point deadline = Clock::now() + milliseconds(options_.watchdog_ms);;) {
+    const Clock::time_point deadline = Clock::now() + milliseconds(options_.watchdog_ms);
+    for (;;) {
       V4l2Camera::Filled newest;
-      const int error = take_newest(newest);
-      if (error == ETIMEDOUT && Clock::now() < deadline) continue;
-      if (error == ETIMEDOUT) lose("no frame for " + std::to_string(options_.watchdog_ms) + " ms");
-      if (error != 0) lose(std::strerror(error));
-      SourceFrame frame;
-      const bool whole = !newest.damaged && camera_->read(newest, frame.image);
-      stamp(newest, frame);
-      if (const int refused = camera_->give_back(newest)) lose(std::strerror(refused));
-      pause_ = kFirstPause;
-      if (whole) return frame;
-      ++health_.incomplete;
+      const int error = take_newest(newest, deadline);
+      if (error != 0 && error != ETIMEDOUT) lose(std::strerror(error));
+      if (error == 0) {
+        SourceFrame frame;
+        const bool whole = !newest.damaged && camera_->read(newest, frame.image);
+        stamp(newest, frame);
+        if (const int refused = camera_->give_back(newest)) lose(std::strerror(refused));
+        if (whole) {
+          pause_ = kFirstPause;
+          return frame;
+        }
+        ++health_.incomplete;
+      }
+      // A camera whose frames are all damaged is of no more use than one that gives none.
+      if (Clock::now() >= deadline) lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms");
     }
   }
 
@@ -68,18 +65,21 @@ class V4l2Source final : public Source {
     throw Error(options_.path + ": the camera is lost (" + why + "); it is opened again as soon as it is back");
   }
 
-  /// The last of the frames that are there; waits a while for the first.
-  int take_newest(V4l2Camera::Filled& newest) {
-    if (const int error = camera_->take(std::min(kSlice_ms, options_.watchdog_ms), newest)) return error;
+  /// The last of the frames that are there, of undamaged ones if there is any; waits until then for the first.
+  int take_newest(V4l2Camera::Filled& newest, Clock::time_point deadline) {
+    const auto left = std::chrono::duration_cast<milliseconds>(deadline - Clock::now()).count();
+    if (const int error = camera_->take(static_cast<int>(std::max<std::int64_t>(left, 0)), newest)) return error;
     count_lost(newest);
     // At most one turn of the ring: a camera that is faster than this loop does not hold it up.
     for (int i = 1; i < options_.buffers; ++i) {
       V4l2Camera::Filled newer;
       if (camera_->take(0, newer) != 0) break;
       count_lost(newer);
-      ++health_.skipped;
-      if (const int error = camera_->give_back(newest)) return error;
-      newest = newer;
+      const bool keeps = newer.damaged && !newest.damaged;
+      const V4l2Camera::Filled& other = keeps ? newer : newest;
+      ++(other.damaged ? health_.incomplete : health_.skipped);
+      if (const int error = camera_->give_back(other)) return error;
+      if (!keeps) newest = newer;
     }
     return 0;
   }

@@ -8,6 +8,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,8 @@ struct FakeV4l2 {
   std::uint32_t only_width = 0, only_rate = 0;
   std::map<std::uint32_t, int> controls = {{V4L2_CID_EXPOSURE_AUTO, 3}, {V4L2_CID_EXPOSURE_ABSOLUTE, 156}};
   std::deque<FakeFrame> frames;
+  /// Given again and again once there is no other.
+  std::optional<FakeFrame> endless;
   /// What waiting comes to when there is no frame.
   int when_empty = ETIMEDOUT;
   /// Opening fails while this is above 0, and counts it down.
@@ -109,6 +112,7 @@ class FakeV4l2Device final : public V4l2Device {
 
   int wait(int) override {
     if (!camera_.streaming) return EINVAL;
+    if (camera_.frames.empty() && camera_.endless) camera_.frames.push_back(*camera_.endless);
     return camera_.frames.empty() || queued_.empty() ? camera_.when_empty : 0;
   }
 
