@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <map>
 #include <mutex>
@@ -257,6 +258,158 @@ TEST(Pipeline, WhatACallbackThrowsEndsItAndComesOutOfStop) {
   EXPECT_TRUE(pipeline.push(picture(0), stamped(0)));
   pipeline.stop();
   EXPECT_EQ(calls, 4);
+}
+
+TEST(Pipeline, ACallbackClosesItButCannotStopIt) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  PipelineConfig config;
+  config.overrun = Overrun::wait;
+  int refused = 0;
+  Pipeline* itself = nullptr;
+  Pipeline pipeline({backend.get()}, kWidth, kHeight, config, [&](const PipelineFrame&) {
+    EXPECT_THAT([&] { itself->stop(); }, ThrowsMessage<Error>(HasSubstr("close()")));
+    ++refused;
+    itself->close();
+  });
+  itself = &pipeline;
+  pipeline.start();
+  u64 taken = 0;
+  while (pipeline.push(picture(taken), stamped(taken))) ++taken;
+  pipeline.stop();
+  EXPECT_GE(refused, 1);
+  EXPECT_EQ(pipeline.counts().offered, taken);
+  EXPECT_EQ(pipeline.counts().delivered, taken);
+}
+
+TEST(Pipeline, TakesFramesBetweenStartAndStopOnly) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  PipelineConfig config;
+  config.overrun = Overrun::wait;
+  Pipeline pipeline({backend.get()}, kWidth, kHeight, config);
+  EXPECT_FALSE(pipeline.push(picture(0), stamped(0)));
+  EXPECT_EQ(pipeline.begin().image.data, nullptr);
+  EXPECT_EQ(pipeline.next(), nullptr);
+  pipeline.close();
+  EXPECT_EQ(pipeline.next(), nullptr);
+  for (u64 round = 0; round < 2; ++round) {
+    EXPECT_FALSE(pipeline.push(picture(0), stamped(0)));
+    pipeline.stop();
+    EXPECT_FALSE(pipeline.push(picture(0), stamped(0)));
+    EXPECT_EQ(pipeline.counts().offered, round);
+    pipeline.start();
+    EXPECT_TRUE(pipeline.push(picture(1), stamped(1)));
+    const PipelineFrame* frame = pipeline.next();
+    ASSERT_NE(frame, nullptr);
+    EXPECT_EQ(frame->result->stamp.sequence, 1u);
+    EXPECT_EQ(pipeline.counts().offered, 1u);
+    EXPECT_EQ(pipeline.counts().delivered, 1u);
+    pipeline.stop();
+  }
+}
+
+TEST(Pipeline, SaysSoWhenAFrameWasNotTaken) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  Pipeline pipeline({backend.get()}, kWidth, kHeight, {}, [](const PipelineFrame&) {});
+  pipeline.start();
+  ASSERT_NE(pipeline.begin().image.data, nullptr);
+  pipeline.close();
+  EXPECT_FALSE(pipeline.commit(stamped(0)));
+  EXPECT_FALSE(pipeline.commit(stamped(0)));  // nor what was not begun
+  pipeline.stop();
+  EXPECT_EQ(pipeline.counts().offered, 0u);
+  // The camera spends most of its time between begin and commit: some of these ends fall there.
+  for (int round = 0; round < 20; ++round) {
+    pipeline.start();
+    std::atomic<u64> taken = 0;
+    std::thread camera([&] {
+      while (pipeline.push(picture(taken), stamped(taken))) ++taken;
+    });
+    while (taken < 3) std::this_thread::yield();
+    pipeline.stop();
+    camera.join();
+    EXPECT_EQ(pipeline.counts().offered, taken);
+  }
+}
+
+/// A backend that throws where none should: in one replay, or in one wait for the device.
+struct Throws {
+  int in_replay = -1, in_finish = -1;
+  std::atomic<int> replays = 0, waits = 0;
+};
+
+class ThrowingStream final : public Stream {
+ public:
+  ThrowingStream(std::unique_ptr<Stream> behind, Throws& throws) : behind_(std::move(behind)), throws_(throws) {}
+  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
+  void download(Buffer& buffer, void* data, std::size_t bytes) override { behind_->download(buffer, data, bytes); }
+  void replay(Plan& plan) override {
+    if (throws_.replays++ == throws_.in_replay) throw std::runtime_error("no replay");
+    behind_->replay(plan);
+  }
+  std::unique_ptr<Event> record_event() override { return behind_->record_event(); }
+  bool finish() override {
+    if (throws_.waits++ == throws_.in_finish) throw std::runtime_error("no wait");
+    return behind_->finish();
+  }
+
+ private:
+  std::unique_ptr<Stream> behind_;
+  Throws& throws_;
+};
+
+class ThrowingBackend final : public Backend {
+ public:
+  explicit ThrowingBackend(Throws& throws) : behind_(open_backend("simd")), throws_(throws) {}
+  const char* name() const override { return "throwing"; }
+  DeviceInfo device() const override { return behind_->device(); }
+  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_->make_buffer(bytes); }
+  std::unique_ptr<Stream> make_stream() override {
+    return std::make_unique<ThrowingStream>(behind_->make_stream(), throws_);
+  }
+  std::unique_ptr<Plan> record(const std::vector<Step>& steps) override { return behind_->record(steps); }
+
+ private:
+  std::unique_ptr<Backend> behind_;
+  Throws& throws_;
+};
+
+TEST(Pipeline, WhatABackendThrowsEndsItAndComesOutOfStop) {
+  for (const bool on_host : {false, true}) {
+    for (const bool calls_back : {false, true}) {
+      SCOPED_TRACE(testing::Message() << (on_host ? "host" : "device") << (calls_back ? ", callback" : ", reader"));
+      Throws throws;
+      ThrowingBackend backend(throws);
+      PipelineConfig config;
+      config.overrun = Overrun::wait;
+      Pipeline::Deliver deliver;
+      if (calls_back) deliver = [](const PipelineFrame&) {};
+      Pipeline pipeline({&backend}, kWidth, kHeight, config, deliver);
+      pipeline.start();
+      (on_host ? throws.in_finish : throws.in_replay) = (on_host ? throws.waits : throws.replays) + 3;
+      std::thread camera([&] {
+        for (u64 i = 0; pipeline.push(picture(i), stamped(i));) ++i;
+      });
+      if (!calls_back) {
+        while (pipeline.next() != nullptr) continue;
+      }
+      camera.join();
+      EXPECT_THAT([&] { pipeline.stop(); },
+                  ThrowsMessage<std::runtime_error>(HasSubstr(on_host ? "no wait" : "no replay")));
+      PipelineCounts counts = pipeline.counts();
+      EXPECT_GE(counts.all_dropped(), 1u);
+      EXPECT_EQ(counts.delivered + counts.all_dropped(), counts.offered);
+      // It was that once only.
+      pipeline.start();
+      EXPECT_TRUE(pipeline.push(picture(0), stamped(0)));
+      if (!calls_back) {
+        EXPECT_NE(pipeline.next(), nullptr);
+      }
+      pipeline.stop();
+      counts = pipeline.counts();
+      EXPECT_EQ(counts.offered, 1u);
+      EXPECT_EQ(counts.delivered, 1u);
+    }
+  }
 }
 
 TEST(Pipeline, ALostDeviceCostsNoFrameWhereThereIsAnother) {

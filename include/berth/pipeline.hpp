@@ -69,7 +69,7 @@ struct PipelineFrame {
 
 /// Where the camera's thread writes a frame.
 struct FrameSlot {
-  /// Rows may be further apart than they are long; null when the pipeline takes no more frames.
+  /// Rows may be further apart than they are long; null when the pipeline takes no frames.
   View2D<u8> image;
   /// 0 to slots − 1: for whoever keeps something of his own beside each frame.
   int slot = 0;
@@ -104,14 +104,15 @@ struct PipelineMemory {
 /// comes to is what a Detector makes of it, whatever the slots, threads and times.
 class Pipeline {
  public:
-  /// Called on the host's thread, frame by frame. What it throws ends the pipeline and comes out of stop.
+  /// Called on the host's thread, frame by frame. What it throws ends the pipeline and comes out of stop. It may call
+  /// close() to end the pipeline, but neither stop() nor the destructor, which wait for that very thread.
   using Deliver = std::function<void(const PipelineFrame&)>;
 
   /// The backends in order of preference, as for FailoverDetector; they outlive this object. Without `deliver`, results
   /// are fetched by poll or next. Throws Error as Detector does, and on a configuration out of bounds.
   Pipeline(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& config,
            Deliver deliver = {});
-  /// Stops; swallows what a callback has thrown.
+  /// Stops; swallows what stop would throw. Never from a callback.
   ~Pipeline();
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
@@ -120,21 +121,22 @@ class Pipeline {
   /// after stop.
   void start();
   /// Takes no more frames, brings those under way to their end and joins the threads; results that nobody fetched are
-  /// dropped. Throws what a callback has thrown.
+  /// dropped. Throws what a callback or, on the pipeline's own threads, a backend has thrown first, which dropped what
+  /// was under way; Error when called from a callback.
   void stop();
-  /// Takes no more frames: what is under way is still delivered, then next() ends.
+  /// Takes no more frames: what is under way is still delivered, then next() ends. From any thread, callbacks too.
   void close();
 
-  /// Copies a frame in; one thread at a time. False once the pipeline takes no more frames. Throws Error on another
-  /// size than the pipeline's.
+  /// Copies a frame in; one thread at a time. False when it was not taken, and stands in no count: before start, after
+  /// close, stop or an error. Throws Error on another size than the pipeline's.
   bool push(View2D<const u8> image, const FrameStamp& stamp);
   /// The same without a copy: a slot to write the pixels to, then commit. The frame that waits may be dropped for it.
   FrameSlot begin();
-  void commit(const FrameStamp& stamp);
+  bool commit(const FrameStamp& stamp);
 
   /// The oldest result not fetched yet, or null; one thread at a time. Only without a callback.
   const PipelineFrame* poll();
-  /// The same, waiting for it; null once the pipeline is closed and all is fetched.
+  /// The same, waiting for it; null once the pipeline is closed, or not started yet, and all is fetched.
   const PipelineFrame* next();
 
   /// At any time, from any thread.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <cstring>
 #include <exception>
 #include <future>
@@ -54,12 +55,18 @@ const PipelineConfig& checked(const PipelineConfig& config) {
 struct Slot {
   std::vector<std::unique_ptr<DeviceFrame>> devices;
   std::size_t on = 0;
+  /// False where enqueueing has thrown: there is nothing to wait for then.
+  bool submitted = false;
   FrameResult result;
   std::int64_t arrived_ns = 0, taken_ns = 0;
   PipelineFrame frame;
 
   DeviceFrame& device() { return *devices[on]; }
 };
+
+/// On a host's thread, the pipeline whose it is. Of the thread itself, so that no id is compared that another thread
+/// may have by now.
+thread_local const void* host_of = nullptr;
 
 void count_one(std::atomic<u64>& counter) {
   counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
@@ -82,6 +89,7 @@ struct Pipeline::Impl {
       slot.frame.result = &slot.result;
       slot.frame.slot = static_cast<int>(i);
     }
+    ring.close();  // until start: a frame that nobody takes would stand in no count
   }
 
   ~Impl() { end(); }
@@ -92,15 +100,16 @@ struct Pipeline::Impl {
     if (device_thread.joinable()) throw Error("the pipeline is running; stop it before it is started again");
     ring.reopen();
     error = nullptr;
+    failed = false;
     for (LatencyHistogram& lap : laps) lap.clear();
     for (std::atomic<u64>* counter : {&run_again, &device_lost, &late[0], &late[1]}) *counter = 0;
     std::promise<void> device_ready;
     std::promise<void> host_ready;
     std::future<void> device_set = device_ready.get_future();
     std::future<void> host_set = host_ready.get_future();
-    device_thread = std::thread([this, ready = std::move(device_ready)]() mutable { run_device(ready); });
-    host_thread = std::thread([this, ready = std::move(host_ready)]() mutable { run_host(ready); });
     try {
+      device_thread = std::thread([this, ready = std::move(device_ready)]() mutable { run_device(ready); });
+      host_thread = std::thread([this, ready = std::move(host_ready)]() mutable { run_host(ready); });
       device_set.get();
       host_set.get();
     } catch (...) {
@@ -135,19 +144,30 @@ struct Pipeline::Impl {
     bool again = false;
     for (int i = ring.take(again); i >= 0; i = ring.take(again)) {
       Slot& slot = at(i);
-      const std::size_t to = active.load(std::memory_order_acquire);
-      if (slot.on != to) {
-        DeviceFrame& next = *slot.devices[to];
-        pad_frame(slot.device().image(), next.geometry(), next.pixels());
-        slot.on = to;
+      slot.submitted = false;
+      try {
+        submit(slot, again);
+        slot.submitted = true;
+      } catch (...) {
+        fail();
       }
-      if (!again) slot.taken_ns = monotonic_ns();
-      slot.device().submit();
-      ring.on_device(i);
+      ring.on_device(i);  // failed ones too: the host's thread drops them in their turn
     }
   }
 
+  void submit(Slot& slot, bool again) {
+    const std::size_t to = active.load(std::memory_order_acquire);
+    if (slot.on != to) {
+      DeviceFrame& next = *slot.devices[to];
+      pad_frame(slot.device().image(), next.geometry(), next.pixels());
+      slot.on = to;
+    }
+    if (!again) slot.taken_ns = monotonic_ns();
+    slot.device().submit();
+  }
+
   void run_host(std::promise<void>& ready) {
+    host_of = this;
     try {
       set_up(1);
       ready.set_value();
@@ -155,26 +175,44 @@ struct Pipeline::Impl {
       ready.set_exception(std::current_exception());
     }
     for (int i = ring.await(); i >= 0; i = ring.await()) {
-      Slot& slot = at(i);
-      const bool alive = wait_for_device(i);
-      ring.on_host();
-      const std::int64_t began_ns = monotonic_ns();
-      if (alive) {
-        host->finish(slot.device(), slot.result);
-      } else {
-        HostFinish::give_up(slot.result);
-        count_one(device_lost);
+      try {
+        finish(i);
+      } catch (...) {
+        fail();
       }
-      take_times(slot, began_ns);
-      if (deliver && !error) call_back(slot.frame);
       ring.done(i, !deliver);
     }
+  }
+
+  void finish(int i) {
+    Slot& slot = at(i);
+    const bool alive = wait_for_device(i);
+    if (!slot.submitted) return;
+    ring.on_host();
+    const std::int64_t began_ns = monotonic_ns();
+    if (alive) {
+      host->finish(slot.device(), slot.result);
+    } else {
+      HostFinish::give_up(slot.result);
+      count_one(device_lost);
+    }
+    take_times(slot, began_ns);
+    if (!deliver || failed) return;
+    ring.delivering();
+    deliver(slot.frame);
+  }
+
+  /// Within a catch, on either thread: the first error is the one that stop throws. What is under way is dropped.
+  void fail() {
+    if (!failed.exchange(true)) error = std::current_exception();
+    ring.close();
+    ring.discard();
   }
 
   /// Waits for the frame; one whose device was lost runs again on the next backend, as all after it do.
   bool wait_for_device(int i) {
     Slot& slot = at(i);
-    while (!slot.device().finish()) {
+    while (slot.submitted && !slot.device().finish()) {
       const std::size_t now = active.load(std::memory_order_relaxed);
       if (slot.on == now) {
         if (now + 1 == slot.devices.size()) return false;
@@ -211,17 +249,6 @@ struct Pipeline::Impl {
     }
   }
 
-  void call_back(const PipelineFrame& frame) {
-    ring.delivering();
-    try {
-      deliver(frame);
-    } catch (...) {
-      error = std::current_exception();
-      ring.close();
-      ring.discard();
-    }
-  }
-
   const PipelineFrame* fetch(bool waiting) {
     const int slot = ring.fetch(waiting);
     return slot < 0 ? nullptr : &at(slot).frame;
@@ -237,7 +264,8 @@ struct Pipeline::Impl {
   std::atomic<u64> run_again = 0, device_lost = 0;
   std::array<std::atomic<u64>, 2> late = {};
   std::array<LatencyHistogram, kLaps> laps;
-  /// What the callback has thrown; the host's thread's until it is joined.
+  /// Whether something was thrown, and what: whoever sets the one writes the other, which is read once both are joined.
+  std::atomic<bool> failed = false;
   std::exception_ptr error;
   int filling = -1;
   std::thread device_thread, host_thread;
@@ -246,10 +274,14 @@ struct Pipeline::Impl {
 Pipeline::Pipeline(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& config,
                    Deliver deliver)
     : impl_(std::make_unique<Impl>(backends, width, height, config, std::move(deliver))) {}
-Pipeline::~Pipeline() = default;
+Pipeline::~Pipeline() {
+  assert(host_of != impl_.get());  // a callback must not destroy it: see stop
+}
 
 void Pipeline::start() { impl_->start(); }
 void Pipeline::stop() {
+  // The thread would wait for its own end.
+  if (host_of == impl_.get()) throw Error("stop called from a callback; call close() there, stop on another thread");
   // With a callback, what is under way still gets there.
   if (impl_->deliver) {
     impl_->ring.close();
@@ -270,14 +302,14 @@ FrameSlot Pipeline::begin() {
   return {{slot.device().pixels(), g.width, g.height, g.padded_width}, impl_->filling};
 }
 
-void Pipeline::commit(const FrameStamp& stamp) {
-  if (impl_->filling < 0) return;
+bool Pipeline::commit(const FrameStamp& stamp) {
+  if (impl_->filling < 0) return false;
   Slot& slot = impl_->at(impl_->filling);
   impl_->filling = -1;
   pad_in_place(slot.device().geometry(), slot.device().pixels());
   slot.result.stamp = stamp;
   slot.arrived_ns = monotonic_ns();
-  impl_->ring.commit();
+  return impl_->ring.commit();
 }
 
 bool Pipeline::push(View2D<const u8> image, const FrameStamp& stamp) {
@@ -291,8 +323,7 @@ bool Pipeline::push(View2D<const u8> image, const FrameStamp& stamp) {
   for (int y = 0; y < image.height; ++y) {
     std::memcpy(slot.image.row(y), image.row(y), static_cast<std::size_t>(image.width));
   }
-  commit(stamp);
-  return true;
+  return commit(stamp);
 }
 
 const PipelineFrame* Pipeline::poll() { return impl_->fetch(false); }

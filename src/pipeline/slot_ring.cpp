@@ -134,7 +134,7 @@ void SlotRing::discard() {
 
 void SlotRing::reopen() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  assert(at_end() || !closed_);
+  assert(at_end());
   if (reading_ >= 0) {
     free_.push(reading_);
     reading_ = -1;

@@ -67,7 +67,7 @@ class SlotRing {
   void close();
   /// No more results for the reader either: those not fetched are dropped, as are those to come.
   void discard();
-  /// As new.
+  /// As new. Only when closed and at its end.
   void reopen();
 
   /// offered, delivered, dropped.
