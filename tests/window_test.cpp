@@ -368,6 +368,10 @@ TEST(Window, RefusesWhatItCannotDo) {
   };
   EXPECT_THAT(refusal({{96, 4, 0}}), HasSubstr("multiples of 8"));
   EXPECT_THAT(refusal({{96, 232, 0}}), HasSubstr("in the frame of 320x240"));
+  // Multiples of 8 whose sums with the side are beyond the greatest int.
+  EXPECT_THAT(refusal({{96, 2147483640, 0}}), HasSubstr("in the frame of 320x240"));
+  EXPECT_THAT(refusal({{96, 0, 2147483640}}), HasSubstr("in the frame of 320x240"));
+  EXPECT_THAT(refusal({{2147483647, 8, 8}}), HasSubstr("in the frame of 320x240"));
   EXPECT_THAT(refusal({{80, 0, 0}}), HasSubstr("window_sides"));
   EXPECT_THAT(refusal({{96, 0, 0}, {96, 8, 8}}), HasSubstr("window_sides"));
   EXPECT_EQ(refusal({{96, 224, 144}, {64, 0, 0}}), "");

@@ -67,8 +67,10 @@ SearchArea& DeviceFrame::free_area(const SearchWindow& window) {
     throw Error("window of " + std::to_string(window.side) + " px at (" + std::to_string(window.x) + ", " +
                 std::to_string(window.y) + "): " + remedy);
   };
-  if (window.x < 0 || window.y < 0 || window.x % kWindowStep != 0 || window.y % kWindowStep != 0 ||
-      window.x + window.side > g.width || window.y + window.side > g.height) {
+  // Sums of what a caller gives could overflow.
+  const bool is_inside = window.side > 0 && window.side <= std::min(g.width, g.height) && window.x >= 0 &&
+                         window.y >= 0 && window.x <= g.width - window.side && window.y <= g.height - window.side;
+  if (!is_inside || window.x % kWindowStep != 0 || window.y % kWindowStep != 0) {
     refuse("give multiples of " + std::to_string(kWindowStep) + " that keep it in the frame of " +
            std::to_string(g.width) + "x" + std::to_string(g.height));
   }
