@@ -32,10 +32,13 @@ HWY_POP_ATTRIBUTES
 
 namespace berth::simd_backend {
 HWY_EXPORT(convolve);
+#ifdef BERTH_SIMD_VNNI
+HWY_EXPORT(has_avx512);
+#endif
 void convolve(const convolve_params& p, const u32* tensor, const u32* weights, const s32* channels, u32* out_tensor,
               int first, int last) {
 #ifdef BERTH_SIMD_VNNI
-  if (vnni::here() && p.group_out_words * 4 % vnni::kLanes == 0) {
+  if (vnni::here() && HWY_DYNAMIC_DISPATCH(has_avx512)() && p.group_out_words * 4 % vnni::kLanes == 0) {
     vnni::convolve(p, tensor, weights, channels, out_tensor, first, last);
     return;
   }

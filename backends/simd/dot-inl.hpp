@@ -28,6 +28,9 @@ constexpr int kTilePositions = 2;
 /// What inputs with a sign are moved by before they are multiplied: nothing (dot_vnni.hpp).
 constexpr u32 kOffset = 0;
 
+/// Whether instructions of AVX-512 may be used beside this target's (dot_vnni.hpp). Better targets have lower numbers.
+HWY_INLINE bool has_avx512() { return HWY_ARCH_X86_64 && HWY_TARGET <= HWY_AVX3; }
+
 HWY_INLINE Sums zero_sums() { return hn::Zero(SumsTag()); }
 HWY_INLINE Sums negative(Sums sums) { return hn::Neg(sums); }
 HWY_INLINE s32 sum_of(Sums sums) { return hn::GetLane(hn::SumOfLanes(SumsTag(), sums)); }

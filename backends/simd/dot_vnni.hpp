@@ -2,7 +2,9 @@
 
 // dot-inl.hpp's words by AVX-512's dot products of bytes: 64 products an instruction. Highway 1.0.3 has no target with
 // avx512vnni alone (its AVX3_DL lets the compiler use instructions of AVX-VNNI, which some such processors lack), so
-// this is a target of our own.
+// this is a target of our own. It stands for Highway's AVX3 where it can, so it is not used where a lesser target is
+// asked for, as tests do of each in turn; of AVX3's own dot products those tests then see only what it cannot do
+// (convolutions whose channels are no multiple of kLanes): all of them run on processors with AVX-512 but without VNNI.
 #include <hwy/highway.h>
 
 #include "berth/types.hpp"
@@ -59,7 +61,8 @@ HWY_INLINE void requantise(Sums sums, const s32* channels, int shift, u8* output
 HWY_POP_ATTRIBUTES
 
 namespace berth::simd_backend::vnni {
-/// Whether this processor has these instructions, and the system keeps their registers.
+/// Whether this processor has these instructions, and the system keeps their registers. Used with has_avx512 of the
+/// target that Highway chose.
 inline bool here() {
   static const bool found = __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
                             __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&

@@ -30,10 +30,13 @@ HWY_POP_ATTRIBUTES
 
 namespace berth::simd_backend {
 HWY_EXPORT(fully_connected);
+#ifdef BERTH_SIMD_VNNI
+HWY_EXPORT(has_avx512);
+#endif
 void fully_connected(const fully_connected_params& p, const u32* tensor, const u32* weights, const s32* channels,
                      u32* out_tensor, int first, int last) {
 #ifdef BERTH_SIMD_VNNI
-  if (vnni::here()) {
+  if (vnni::here() && HWY_DYNAMIC_DISPATCH(has_avx512)()) {
     vnni::fully_connected(p, tensor, weights, channels, out_tensor, first, last);
     return;
   }
