@@ -292,6 +292,41 @@ TEST(Run, FollowsMarkersInWindowsAndSaysWhere) {
   EXPECT_THAT(run.out, HasSubstr("whole: regular"));
 }
 
+// Frames of half the size are filtered, and their windows placed, by what --camera-fit makes of the file's camera.
+TEST(Run, FiltersAndTracksByTheCameraThatFits) {
+  const ScratchFolder folder;
+  write_camera_info(folder / "twice.yaml", paper_camera(1280, 960));
+  write_camera_info(folder / "fitting.yaml", resized_camera(paper_camera(1280, 960), 640, 480));
+  const auto log_with = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"run", "--source", "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml", "--max-frames",
+                                     "6", "--json", folder / "log", "--track", "--filter", "--camera"});
+    const CommandRun run = run_berth(options);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return CommandRun::json_lines(text_of(folder / "log"));
+  };
+  const std::vector<json> expected = log_with({folder / "fitting.yaml"});
+  const std::vector<json> log = log_with({folder / "twice.yaml", "--camera-fit", "resize"});
+  ASSERT_EQ(log.size(), 6u);
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    EXPECT_EQ(log[i]["search"], expected[i]["search"]) << i;
+    ASSERT_EQ(log[i]["filtered"].size(), expected[i]["filtered"].size()) << i;
+    if (expected[i]["filtered"].empty()) continue;
+    const double expected_z = expected[i]["filtered"][0]["t"][2].get<double>();
+    EXPECT_NEAR(log[i]["filtered"][0]["t"][2].get<double>(), expected_z, 1e-6) << i;
+  }
+  EXPECT_FALSE(log.back()["filtered"].empty());
+}
+
+TEST(Run, RefusesToTrackWhatWindowsDoNotShow) {
+  const CommandRun run = run_berth(
+      {"run", "--source", "sim:not_there.toml", "--track", "--target", BERTH_SOURCE_DIR "/targets/port.yaml"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("--track"), HasSubstr("--target"), HasSubstr("leave one of the two out")));
+  const CommandRun alone = run_berth({"run", "--source", "sim:not_there.toml", "--full-every", "3"});
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_THAT(alone.err, AllOf(HasSubstr("--full-every"), HasSubstr("--track")));
+}
+
 TEST(Run, LogOnStandardOutputIsAllThatIsThere) {
   const CommandRun run = run_berth({"run", "--source", "file:" + kImage, "--json", "-"});
   EXPECT_EQ(run.exit_code, 0) << run.err;

@@ -68,11 +68,13 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->add_flag("--digests", options->stream.digests, "log a digest of every stage's output (slow)");
   command->add_flag("--filter", options->stream.filter,
                     "poses filtered over time, with velocities, beside the raw ones");
-  command->add_flag("--track", options->stream.track, "search only around the markers held, with the same bits");
+  CLI::Option* track =
+      command->add_flag("--track", options->stream.track, "search only around the markers held, with the same bits");
   command
       ->add_option("--full-every", options->stream.full_every,
                    "with --track: the whole frame after so many in windows at the latest")
       ->type_name("N")
+      ->needs(track)
       ->check(CLI::Range(1, 1000000))
       ->default_str(std::to_string(TrackerConfig().full_every));
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
@@ -86,6 +88,11 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->callback([options, &console, &exit_code] {
     if (options->stream.pace.fps != 0 && options->source.rfind("v4l2:", 0) == 0) {
       throw Error(options->source + ": --fps plays recordings, a camera has a pace of its own; leave --fps out");
+    }
+    if (options->stream.track && !options->stream.engine.target_files.empty()) {
+      throw Error(
+          "--track searches in windows, which show markers alone; --target needs whole frames: leave one of the two "
+          "out");
     }
     const std::unique_ptr<Source> source = open_source(options->source);
     exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;

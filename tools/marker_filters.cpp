@@ -6,9 +6,9 @@
 namespace berth::cli {
 namespace {
 
-PoseFilterConfig config_for(const DetectorConfig& config, double size_m) {
+PoseFilterConfig config_for(const CameraModel& camera, double size_m) {
   PoseFilterConfig filter;
-  filter.camera = *config.camera;
+  filter.camera = camera;
   filter.marker_size_m = size_m;
   return filter;
 }
@@ -16,13 +16,13 @@ PoseFilterConfig config_for(const DetectorConfig& config, double size_m) {
 }  // namespace
 
 void MarkerFilters::update(const FrameResult& frame, const DetectorConfig& config,
-                           const std::vector<TruthMarker>& truth) {
+                           const std::optional<CameraModel>& camera, const std::vector<TruthMarker>& truth) {
   for (const Detection& detection : frame.detections) {
     const std::pair<std::string, int> key = {detection.family->name, detection.id};
-    if (!detection.has_pose || tracks_.count(key) != 0 || tracks_.size() == kMost) continue;
+    if (!camera || !detection.has_pose || tracks_.count(key) != 0 || tracks_.size() == kMost) continue;
     const TruthMarker* marker = truth_of(detection, truth);
     const double size_m = marker != nullptr ? marker->size_m : marker_size_m(config, *detection.family, detection.id);
-    tracks_.emplace(key, Track{PoseFilter(config_for(config, size_m)), detection.family, {}, size_m});
+    tracks_.emplace(key, Track{PoseFilter(config_for(*camera, size_m)), detection.family, {}, size_m});
   }
   poses_.clear();
   for (auto& [key, track] : tracks_) {
@@ -38,9 +38,10 @@ void MarkerFilters::update(const FrameResult& frame, const DetectorConfig& confi
   }
 }
 
-void MarkerFilters::foretell(std::int64_t time_ns, const DetectorConfig& config, Tracker& tracker) const {
+void MarkerFilters::foretell(std::int64_t time_ns, const std::optional<CameraModel>& camera, Tracker& tracker) const {
+  if (!camera) return;
   for (const auto& [key, track] : tracks_) {
-    tracker.expect(*track.family, key.second, *config.camera, track.size_m, track.filter.foretell(time_ns));
+    tracker.expect(*track.family, key.second, *camera, track.size_m, track.filter.foretell(time_ns));
   }
 }
 

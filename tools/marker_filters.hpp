@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,11 +21,12 @@ class MarkerFilters {
   static constexpr std::size_t kMost = 64;
 
   /// Takes a frame: detections with poses of markers whose size is their bundle's or the configuration's, or the
-  /// truth's where it has one.
-  void update(const FrameResult& frame, const DetectorConfig& config, const std::vector<TruthMarker>& truth);
+  /// truth's where it has one. `camera`: the frame's, which may be another than the configuration's; none: no poses.
+  void update(const FrameResult& frame, const DetectorConfig& config, const std::optional<CameraModel>& camera,
+              const std::vector<TruthMarker>& truth);
 
-  /// Tells a tracker where the markers will be at that time.
-  void foretell(std::int64_t time_ns, const DetectorConfig& config, Tracker& tracker) const;
+  /// Tells a tracker where the markers will be in its frame of that time, seen by that camera.
+  void foretell(std::int64_t time_ns, const std::optional<CameraModel>& camera, Tracker& tracker) const;
 
   /// Every marker with a track: family, id, pose, velocity and what is known of them.
   Json to_json() const;

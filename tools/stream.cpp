@@ -135,7 +135,7 @@ class StreamRun {
     if (!engine_) make_engine(frame);
     refuse_poses(frame);
     if (options_.filter && engine_->tracker() != nullptr) {
-      filters_.foretell(frame.stamp.mid_exposure_ns, engine_->config(), *engine_->tracker());
+      filters_.foretell(frame.stamp.mid_exposure_ns, camera_of(frame), *engine_->tracker());
     }
     const Backend* before = &engine_->backend();
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
@@ -150,6 +150,11 @@ class StreamRun {
     wall_ns_ += timed.wall_ns;
     cpu_ns_ += timed.cpu_ns;
     gather(frame, result, timed.cpu_ns, nullptr, true);
+  }
+
+  /// The camera file's, or what --camera-fit makes of it.
+  std::optional<CameraModel> camera_of(const SourceFrame& frame) const {
+    return engine_->camera_for(frame.image.width(), frame.image.height());
   }
 
   void refuse_poses(const SourceFrame& frame) {
@@ -216,7 +221,7 @@ class StreamRun {
       throw Error(frame.label +
                   ": frames without times cannot be filtered; leave --filter out, or use a video or a live source");
     }
-    filters_.update(result, engine_->config(), frame.truth);
+    filters_.update(result, engine_->config(), camera_of(frame), frame.truth);
     if (!frame.truth.empty() && scored) filtered_score_.add(frame.truth, filters_.as_detections());
   }
 
