@@ -349,6 +349,29 @@ TEST(Tracker, ALostDeviceCostsNoFrame) {
   EXPECT_EQ(detector.active(), 1u);
 }
 
+TEST(Tracker, SaysThatADeviceWasLostInWindows) {
+  const std::unique_ptr<Backend> simd = open_backend("simd");
+  test::Fault fault;
+  fault.lose_frame = 1;
+  const std::unique_ptr<Backend> faulty = test::make_faulty_backend(*simd, fault);
+  DetectorConfig config;
+  config.window_sides = tracking_window_sides(kWidth, kHeight);
+  Detector detector(*faulty, kWidth, kHeight, config);
+  Tracker tracker(kWidth, kHeight);
+  const GrayImage image = picture({{3, 0, 0, 0.8}});
+  EXPECT_GT(tracker.look(detector, image.view(), stamp(0)).result->times[0].ns, 0);
+  const TrackedFrame& lost = tracker.look(detector, image.view(), stamp(1));
+  EXPECT_EQ(lost.result->status, FrameStatus::device_lost);
+  EXPECT_EQ(lost.why, SearchReason::lost);
+  EXPECT_FALSE(lost.whole);
+  EXPECT_EQ(lost.windows.size(), 1u);
+  EXPECT_EQ(tracker.counts().by_reason[static_cast<std::size_t>(SearchReason::held)], 0u);
+  for (const StageTime& time : lost.result->times) {
+    EXPECT_STREQ(time.stage, "") << "of the frame before";
+    EXPECT_EQ(time.ns, 0);
+  }
+}
+
 TEST(Tracker, RefusesWhatIsOutOfBounds) {
   const auto refusal = [](void (*change)(TrackerConfig&)) {
     TrackerConfig config;

@@ -16,7 +16,7 @@ enum class SearchReason {
   held,       ///< Every marker held was found in its window.
   none_held,  ///< No marker was held.
   regular,    ///< So many frames since the last whole search: markers that are not held may have come.
-  lost,       ///< A marker held was not where its window said.
+  lost,       ///< A marker held was not where its window said, or the device was lost while windows were searched.
   overflow,   ///< A window's lists ran full.
   border,     ///< A marker held is too near the image's border for a window around it.
   large,      ///< The windows would save too little.
@@ -61,10 +61,12 @@ struct SearchOrder {
 
 /// One frame, searched in windows or whole.
 struct TrackedFrame {
+  /// Its `times` are of the search that it is of: of a frame searched again whole, of that search alone.
   const FrameResult* result = nullptr;
   /// The windows that were searched, in vain where `whole` is true as well.
   std::vector<SearchWindow> windows;
-  /// Whether the whole frame was searched, and the result is of that.
+  /// Whether the whole frame was searched, and the result is of that. False with `lost` or `overflow`: the next frame
+  /// is (same_frame), or the device is lost (the result's status).
   bool whole = true;
   SearchReason why = SearchReason::none_held;
   /// Markers held after the frame.

@@ -171,6 +171,7 @@ struct HostFinish::Impl {
     std::fill(result.bundles.begin(), result.bundles.end(), BundlePose{});
     std::fill(result.disc_targets.begin(), result.disc_targets.end(), DiscPose{});
     result.digests.clear();
+    result.times = {};
     result.quads = 0;
     result.capacities = {};
   }

@@ -264,8 +264,13 @@ void Tracker::next(const FrameStamp& stamp, SearchOrder& order) {
 
 bool Tracker::take(SearchOrder& order, const FrameResult& result) {
   Impl& it = *impl_;
-  if (order.windows.empty() || result.status == FrameStatus::device_lost) {
+  if (order.windows.empty()) {
     it.finish(order, result, order.why);
+    return true;
+  }
+  // Nothing more can be searched.
+  if (result.status == FrameStatus::device_lost) {
+    it.finish(order, result, SearchReason::lost);
     return true;
   }
   const bool full = result.status == FrameStatus::overflow;
