@@ -10,6 +10,7 @@
 #include "berth/detector.hpp"
 #include "sim/render.hpp"
 #include "support/disc_scene.hpp"
+#include "target/disc_finder.hpp"
 #include "target/disc_pose.hpp"
 #include "target/refine_pose.hpp"
 
@@ -161,6 +162,50 @@ TEST(DiscFit, IsMoreExactThanTheCentroid) {
   RecordProperty("slanted_moments_px", std::to_string(slanted.moments));
   EXPECT_LT(slanted.fit, 1.3 * even.fit);
   EXPECT_GT(slanted.moments, 2 * even.moments);
+}
+
+/// A disc's contour as contour_trace writes it: each row's start and end.
+std::vector<u32> outline(int center_x, int center_y, int radius) {
+  std::vector<u32> points;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    const int half = static_cast<int>(std::sqrt(radius * radius - dy * dy + radius / 2.0));
+    const auto point = [&](int x, int is_end) {
+      points.push_back(static_cast<u32>((2 * (center_y + dy) + is_end) << 16 | 2 * x));
+    };
+    point(center_x - half, 0);
+    point(center_x + half + 1, 1);
+  }
+  return points;
+}
+
+TEST(DiscFinder, OfTooManyOutlinesKeepsTheLargest) {
+  constexpr int kSide = 200, kAt = 180, kRadius = 10, kApart = 6;
+  DiscFinder finder({port()}, test::corner_camera(kSide, kSide));
+  GrayImage image(kSide, kSide);
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const bool inside = (x - kAt) * (x - kAt) + (y - kAt) * (y - kAt) < kRadius * kRadius;
+      image.view().row(y)[x] = inside ? 40 : 200;
+    }
+  }
+  std::vector<DiscPose> poses(1);
+  for (const int first : {0, 1}) {
+    finder.clear();
+    const auto add_disc = [&] {
+      const std::vector<u32> points = outline(kAt, kAt, kRadius);
+      finder.add_outline(points.data(), static_cast<int>(points.size()), 1);
+    };
+    if (first != 0) add_disc();
+    for (std::size_t i = 0; i < DiscFinder::kMostOutlines + 100; ++i) {
+      const int row = static_cast<int>(i / 25), column = static_cast<int>(i % 25);
+      const std::vector<u32> points = outline(5 + kApart * column, 5 + kApart * row, 3);
+      finder.add_outline(points.data(), static_cast<int>(points.size()), 1);
+    }
+    if (first == 0) add_disc();
+    finder.find(image.view(), poses);
+    ASSERT_EQ(finder.discs().size(), 1u) << first;
+    EXPECT_NEAR(finder.discs()[0].center_px[0], kAt, 0.05);
+  }
 }
 
 TEST(DiscFit, RefusesWhatIsNoDisc) {

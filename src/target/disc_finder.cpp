@@ -42,11 +42,19 @@ DiscFinder::DiscFinder(const std::vector<DiscTarget>& targets, const CameraModel
 
 void DiscFinder::add_outline(const u32* points, int count, int scale) {
   Ellipse outline;
-  if (outlines_.size() == kMostOutlines || !outline_ellipse(points, count, scale, outline)) return;
+  if (!outline_ellipse(points, count, scale, outline)) return;
+  // A heap, whose first is the last in order.
+  const bool is_full = outlines_.size() == kMostOutlines;
+  if (is_full && !comes_before(outline, outlines_.front())) return;
   for (const Ellipse& known : outlines_) {
     if (same_place(known, outline)) return;
   }
+  if (is_full) {
+    std::pop_heap(outlines_.begin(), outlines_.end(), comes_before);
+    outlines_.pop_back();
+  }
   outlines_.push_back(outline);
+  std::push_heap(outlines_.begin(), outlines_.end(), comes_before);
 }
 
 void DiscFinder::find(View2D<const u8> image, std::vector<DiscPose>& results) {

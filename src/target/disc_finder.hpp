@@ -11,7 +11,7 @@ namespace berth {
 /// The targets of discs in a frame: from its contours to poses. All memory is taken in the constructor.
 class DiscFinder {
  public:
-  /// Round contours that a frame may have; what comes after is left out. Of those the largest are measured.
+  /// Round contours of a frame that are kept, and of those that are measured: the largest, from above, from the left.
   static constexpr std::size_t kMostOutlines = 512, kMostMeasured = 128;
 
   /// Throws Error where DiscTarget::check does, or two targets have one name.
