@@ -34,8 +34,7 @@ enum class PoseMethod {
 /// How exact a marker's corners are had (docs/corners.md).
 enum class CornerMethod {
   /// From lines through the gray-level edges of the border: on the device, next to nothing. With a camera, what its
-  /// lens
-  /// makes of lines along bent sides is taken off.
+  /// lens makes of lines along bent sides is taken off.
   edges,
   /// From a fit of the whole decoded pattern on the host, at about the noise's limit. Corners come with covariances.
   /// Where the fit does not hold they are the edges'.

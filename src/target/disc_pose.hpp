@@ -25,7 +25,7 @@ bool disc_ellipse(const Pose& pose, const TargetDisc& disc, Ellipse& ellipse);
 bool refine_disc_pose(const SeenDisc* discs, std::size_t count, double deviation_m, const Pose& start,
                       RefinedPose& result);
 
-/// How far a seen centre lies off where the pose puts it, px; a large number where it puts it nowhere.
+/// How far a seen centre lies off where the pose puts it, px.
 double center_error_px(const FittedDisc& seen, const Ellipse& expected);
 
 }  // namespace berth

@@ -15,8 +15,7 @@ class FitPass {
   /// Which pixels a pass takes: a quarter of them, all over the marker, for a step that need not be exact.
   enum class Share { all, quarter };
 
-  /// Returns false where too few pixels count, the map has no end or the
-  /// blur is too wide for the modules.
+  /// Returns false where too few pixels count, the map has no end or the blur is too wide for the modules.
   bool run(const FitScene& scene, const FitState& state, Share share);
   /// Of residuals that are neighbours in a row and away from all edges: 0 where they are noise or too few, near 1 where
   /// the levels are wrong.
