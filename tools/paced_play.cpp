@@ -189,7 +189,12 @@ void PacedPlay::film() {
 
 const PipelineFrame* PacedPlay::next() {
   const PipelineFrame* frame = pipeline_.next();
-  if (frame != nullptr) note_result(*frame);
+  if (frame != nullptr) {
+    note_result(*frame);
+  } else {
+    if (camera_.joinable()) camera_.join();
+    pipeline_.stop();
+  }
   sample_memory();
   return frame;
 }

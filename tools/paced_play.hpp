@@ -49,7 +49,7 @@ class PacedPlay {
 
   /// Starts the threads; the calling one is the reader. Throws Error where a core or a priority cannot be had.
   void start();
-  /// The next result, waiting for it; null at the end.
+  /// The next result, waiting for it; null at the end. Throws there what went wrong in the pipeline's threads.
   const PipelineFrame* next();
   /// What a result was made of, and whether it is of the first time round.
   const SourceFrame& source_of(const PipelineFrame& frame) const;
