@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -179,13 +180,13 @@ std::vector<u32> outline(int center_x, int center_y, int radius) {
 }
 
 TEST(DiscFinder, OfTooManyOutlinesKeepsTheLargest) {
-  constexpr int kSide = 200, kAt = 180, kRadius = 10, kApart = 6;
+  constexpr int kSide = 240, kAt = 50, kRadius = 10, kApart = 6;
   DiscFinder finder({port()}, test::corner_camera(kSide, kSide));
   GrayImage image(kSide, kSide);
   for (int y = 0; y < kSide; ++y) {
     for (int x = 0; x < kSide; ++x) {
-      const bool inside = (x - kAt) * (x - kAt) + (y - kAt) * (y - kAt) < kRadius * kRadius;
-      image.view().row(y)[x] = inside ? 40 : 200;
+      const double inside = kRadius + 0.5 - std::sqrt((x - kAt) * (x - kAt) + (y - kAt) * (y - kAt));
+      image.view().row(y)[x] = static_cast<u8>(200 - 160 * std::clamp(inside / 2 + 0.25, 0.0, 1.0));
     }
   }
   std::vector<DiscPose> poses(1);
@@ -198,7 +199,7 @@ TEST(DiscFinder, OfTooManyOutlinesKeepsTheLargest) {
     if (first != 0) add_disc();
     for (std::size_t i = 0; i < DiscFinder::kMostOutlines + 100; ++i) {
       const int row = static_cast<int>(i / 25), column = static_cast<int>(i % 25);
-      const std::vector<u32> points = outline(5 + kApart * column, 5 + kApart * row, 3);
+      const std::vector<u32> points = outline(85 + kApart * column, 85 + kApart * row, 3);
       finder.add_outline(points.data(), static_cast<int>(points.size()), 1);
     }
     if (first == 0) add_disc();
