@@ -5,19 +5,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <string>
 
 #include "berth/bundle.hpp"
-#include "berth/error.hpp"
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
 #include "support/command_run.hpp"
+#include "support/complaint.hpp"
 #include "support/scratch_folder.hpp"
 
 namespace berth {
 namespace {
 
+using test::complaint;
 using test::ScratchFolder;
 using test::text_of;
 using testing::HasSubstr;
@@ -142,15 +142,6 @@ TEST(BundleFile, HasTheMarkersOfAWpilibField) {
   EXPECT_EQ(column(far.pose.R, 1), (Vec3{0, 0, -1}));
   EXPECT_EQ(column(far.pose.R, 2), (Vec3{1, 0, 0}));
   EXPECT_EQ(read_bundles(folder / "field.json", 0.1524, "tag16h5")[0].markers[0].family, &family("tag16h5"));
-}
-
-std::string complaint(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 struct BadFile {

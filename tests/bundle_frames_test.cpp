@@ -4,24 +4,24 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "berth/bundle.hpp"
 #include "berth/detector.hpp"
-#include "berth/error.hpp"
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
 #include "sim/render.hpp"
 #include "support/command_run.hpp"
+#include "support/complaint.hpp"
 #include "target/symmetric.hpp"
 
 namespace berth {
 namespace {
 
 using test::CommandRun;
+using test::complaint;
 using test::run_berth;
 using test::ScratchFolder;
 using testing::HasSubstr;
@@ -144,15 +144,6 @@ TEST(BundleFrames, NestedMarkersLastToTheEnd) {
     EXPECT_EQ(pose.used, range_m > 0.2 ? 2 : 1) << range_m;
     EXPECT_LT(length(add(pose.pose.t, scaled(truth.t, -1))), 0.005 * range_m) << range_m;
   }
-}
-
-std::string complaint(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(BundleFrames, AreRefusedWhereTheyDoNotHold) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -16,6 +15,7 @@
 #include "sim/body.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
+#include "support/complaint.hpp"
 #include "support/counted_allocations.hpp"
 #include "support/disc_scene.hpp"
 #include "target/refine_pose.hpp"
@@ -24,6 +24,7 @@
 namespace berth {
 namespace {
 
+using test::complaint;
 using testing::HasSubstr;
 
 DiscTarget shipped(const std::string& name) {
@@ -305,15 +306,6 @@ TEST(DiscFrames, FramesAllocateNothing) {
   const std::size_t before = test::allocations();
   EXPECT_TRUE(frames.find(image).has_pose);
   EXPECT_EQ(test::allocations(), before);
-}
-
-std::string complaint(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(DiscFrames, WhatDoesNotHoldIsRefused) {

@@ -72,10 +72,7 @@ SceneTarget read_scene_target(TomlReader& reader) {
   const std::string file = reader.text("file", "");
   if (file.empty()) reader.fail("file", "name the target's file, e.g. \"../targets/port.yaml\"");
   scene.target = read_disc_target(reader.beside(file));
-  const Vec3 at = reader.triple("position_m", {0, 0, 0}, -20, 20);
-  const Vec3 angles = reader.triple("rotation_deg", {0, 0, 0}, -180, 180);
-  scene.pose = translation(at[0], at[1], at[2]);
-  scene.pose.R = rotation(radians(angles[0]), radians(angles[1]), radians(angles[2]));
+  scene.pose = reader.pose();
   scene.margin_m = reader.number("margin_m", scene.margin_m, 0, 5);
   scene.white = reader.number("white", scene.white, 0, 1);
   scene.black = reader.number("black", scene.black, 0, 1);

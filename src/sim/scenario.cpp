@@ -112,11 +112,7 @@ SceneMarker read_marker(TomlReader& reader) {
   }
   marker.id = reader.integer("id", 0, 0, static_cast<int>(shape->codes.size()) - 1);
   marker.size_m = reader.number("size_m", 0.1, 0.0005, 10);
-  const Vec3 at = reader.triple("position_m", {0, 0, 0}, -20, 20);
-  const Vec3 angles = reader.triple("rotation_deg", {0, 0, 0}, -180, 180);
-  Pose plane = translation(at[0], at[1], at[2]);
-  plane.R = rotation(radians(angles[0]), radians(angles[1]), radians(angles[2]));
-  marker.pose = plane;
+  marker.pose = reader.pose();
   marker.margin_modules = reader.number("margin_modules", marker.margin_modules, 0, 20);
   marker.plate_m = reader.number("plate_m", marker.plate_m, 0, 5);
   marker.plate_albedo = reader.number("plate_albedo", marker.plate_albedo, 0, 1);

@@ -144,6 +144,14 @@ Vec3 TomlReader::triple(const std::string& key, const Vec3& otherwise, double lo
   return {values[0], values[1], values[2]};
 }
 
+Pose TomlReader::pose() {
+  const Vec3 at = triple("position_m", {0, 0, 0}, -20, 20);
+  const Vec3 angles = triple("rotation_deg", {0, 0, 0}, -180, 180);
+  Pose pose = translation(at[0], at[1], at[2]);
+  pose.R = rotation(radians(angles[0]), radians(angles[1]), radians(angles[2]));
+  return pose;
+}
+
 TomlReader TomlReader::table(const std::string& key) {
   const toml::node* node = find(key);
   if (node != nullptr && !node->is_table()) fail(*node, key, "make it a table: [" + prefix_ + key + "]");

@@ -30,6 +30,8 @@ class TomlReader {
   std::vector<double> numbers(const std::string& key, const std::vector<double>& otherwise, double low, double high);
   Vec2 pair(const std::string& key, const Vec2& otherwise, double low, double high);
   Vec3 triple(const std::string& key, const Vec3& otherwise, double low, double high);
+  /// Where a thing on a body is: position_m and rotation_deg (rotation(), degrees), both 0 by default.
+  Pose pose();
   /// A table; an empty one where the key is missing.
   TomlReader table(const std::string& key);
   /// An array of tables, `[[key]]`; none where the key is missing.
