@@ -7,12 +7,14 @@
 //
 #include <hwy/highway.h>
 
+#include "tile_extrema-inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Four rows at once, then the four bytes of each word. padded_width is a multiple of 32, so 32 bytes divide every row.
+// padded_width is a multiple of 32, so 32 bytes divide every row.
 void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, u32* maxima) {
 #if HWY_TARGET == HWY_SCALAR  // a processor without any vectors Highway knows
   reference::tile_extrema(p, pixels, minima, maxima);
@@ -30,14 +32,7 @@ void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, 
       const auto b = hn::LoadU(bytes, row + x + stride);
       const auto c = hn::LoadU(bytes, row + x + stride * 2);
       const auto d = hn::LoadU(bytes, row + x + stride * 3);
-      auto least = hn::Min(hn::Min(a, b), hn::Min(c, d));
-      auto most = hn::Max(hn::Max(a, b), hn::Max(c, d));
-      least = hn::Min(least, hn::BitCast(bytes, hn::ShiftRight<16>(hn::BitCast(words, least))));
-      most = hn::Max(most, hn::BitCast(bytes, hn::ShiftRight<16>(hn::BitCast(words, most))));
-      least = hn::Min(least, hn::BitCast(bytes, hn::ShiftRight<8>(hn::BitCast(words, least))));
-      most = hn::Max(most, hn::BitCast(bytes, hn::ShiftRight<8>(hn::BitCast(words, most))));
-      hn::StoreU(hn::TruncateTo(tiles, hn::BitCast(words, least)), tiles, low);
-      hn::StoreU(hn::TruncateTo(tiles, hn::BitCast(words, most)), tiles, high);
+      berth::HWY_NAMESPACE::store_tile_extrema(bytes, a, b, c, d, low, high);
       low += hn::Lanes(tiles);
       high += hn::Lanes(tiles);
     }

@@ -10,6 +10,8 @@
 //
 #include <hwy/highway.h>
 
+#include "tile_extrema-inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace berth::HWY_NAMESPACE {
 namespace {
@@ -45,7 +47,6 @@ std::size_t count_up_to(const u8* values, std::size_t count, u8 most) {
 #else
 
 using Bytes = hn::FixedTag<u8, 16>;
-using Words = hn::FixedTag<u32, 4>;
 using Row = hn::Vec<Bytes>;
 
 /// Row y of a block of the image.
@@ -72,18 +73,7 @@ HWY_INLINE Row halved_row_of(std::ptrdiff_t stride, const u8* pixels, int y) {
 
 template <class Get>
 HWY_INLINE void extrema_of(const Get& row, u8* minima, u8* maxima) {
-  const Bytes bytes;
-  const Words words;
-  const auto a = row(0), b = row(1), c = row(2), d = row(3);
-  auto least = hn::Min(hn::Min(a, b), hn::Min(c, d));
-  auto most = hn::Max(hn::Max(a, b), hn::Max(c, d));
-  least = hn::Min(least, hn::BitCast(bytes, hn::ShiftRight<16>(hn::BitCast(words, least))));
-  most = hn::Max(most, hn::BitCast(bytes, hn::ShiftRight<16>(hn::BitCast(words, most))));
-  least = hn::Min(least, hn::BitCast(bytes, hn::ShiftRight<8>(hn::BitCast(words, least))));
-  most = hn::Max(most, hn::BitCast(bytes, hn::ShiftRight<8>(hn::BitCast(words, most))));
-  const hn::FixedTag<u8, 4> tiles;
-  hn::StoreU(hn::TruncateTo(tiles, hn::BitCast(words, least)), tiles, minima);
-  hn::StoreU(hn::TruncateTo(tiles, hn::BitCast(words, most)), tiles, maxima);
+  store_tile_extrema(Bytes(), row(0), row(1), row(2), row(3), minima, maxima);
 }
 
 void block_extrema(int scale, const u8* pixels, std::ptrdiff_t stride, int count, int step, u8* minima, u8* maxima) {
