@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
-#include <new>
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
@@ -21,22 +20,16 @@ std::size_t berth::test::allocations() { return count; }
 
 #ifdef BERTH_SANITIZED
 
-// In a source of their own: where GCC sees free() beside operator new, it takes them for a mismatch.
-void* operator new(std::size_t bytes) {
-  ++count;
-  if (void* memory = std::malloc(bytes)) return memory;
-  throw std::bad_alloc();
+// The sanitizers replace malloc and operator new themselves, and tell whoever asks. Clang's
+// sanitizer/allocator_interface.h says so; GCC has the function but not the header.
+// NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming)
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void* memory,
+                                                                           std::size_t bytes),
+                                                         void (*on_free)(const volatile void* memory));
+namespace {
+const int hooked = __sanitizer_install_malloc_and_free_hooks([](const volatile void*, std::size_t) { ++count; },
+                                                             [](const volatile void*) {});
 }
-void* operator new(std::size_t bytes, std::align_val_t alignment) {
-  ++count;
-  const std::size_t step = static_cast<std::size_t>(alignment);
-  if (void* memory = std::aligned_alloc(step, (bytes + step - 1) / step * step)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 
 #else
 

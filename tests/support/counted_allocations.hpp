@@ -4,8 +4,8 @@
 
 namespace berth::test {
 
-/// Allocations of the program so far, by any thread, C's as well as C++'s (under sanitizers, which need malloc for
-/// themselves, operator new alone); only in tests that tests/CMakeLists.txt gives counted_allocations.cpp.
+/// Allocations of the program so far, by any thread, C's as well as C++'s; only in tests that tests/CMakeLists.txt
+/// gives counted_allocations.cpp.
 std::size_t allocations();
 
 }  // namespace berth::test
