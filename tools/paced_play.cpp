@@ -7,7 +7,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <exception>
 #include <fstream>
 #include <future>
@@ -18,6 +17,7 @@
 #include "frame/digest.hpp"
 #include "monotonic.hpp"
 #include "pipeline/thread_setup.hpp"
+#include "result_digest.hpp"
 #include "source_arguments.hpp"
 
 namespace berth::cli {
@@ -42,43 +42,6 @@ std::int64_t resident_kb() {
   std::int64_t resident = 0;
   statm >> size >> resident;
   return resident * sysconf(_SC_PAGESIZE) / 1024;
-}
-
-void hash(u64& digest, double value) {
-  std::array<u32, 2> words = {};
-  std::memcpy(words.data(), &value, sizeof value);
-  digest = digest_words(words.data(), words.size(), digest);
-}
-
-/// Of every marker, its corners and its pose, bit for bit.
-u64 digest_of(const FrameResult& result) {
-  const u32 status = static_cast<u32>(result.status);
-  u64 digest = digest_words(&status, 1);
-  for (const Detection& d : result.detections) {
-    const u32 id = static_cast<u32>(d.id);
-    digest = digest_words(&id, 1, digest);
-    for (const auto& corner : d.corners) {
-      for (const double value : corner) hash(digest, value);
-    }
-    if (!d.has_pose) continue;
-    for (const double value : d.pose.R) hash(digest, value);
-    for (const double value : d.pose.t) hash(digest, value);
-  }
-  for (const BundlePose& bundle : result.bundles) {
-    if (!bundle.has_pose) continue;
-    for (const double value : bundle.pose.R) hash(digest, value);
-    for (const double value : bundle.pose.t) hash(digest, value);
-  }
-  for (const DiscPose& target : result.disc_targets) {
-    if (!target.has_pose) continue;
-    for (const double value : target.pose.R) hash(digest, value);
-    for (const double value : target.pose.t) hash(digest, value);
-  }
-  for (const StageDigest& stage : result.digests) {
-    const std::array<u32, 2> words = {static_cast<u32>(stage.digest), static_cast<u32>(stage.digest >> 32)};
-    digest = digest_words(words.data(), words.size(), digest);
-  }
-  return digest;
 }
 
 double megabytes(std::size_t bytes) { return static_cast<double>(bytes) / 1e6; }

@@ -18,6 +18,7 @@
 #include "live_view.hpp"
 #include "marker_filters.hpp"
 #include "output_file.hpp"
+#include "result_digest.hpp"
 #include "source_arguments.hpp"
 #include "systematic_show.hpp"
 #include "target_show.hpp"
@@ -128,7 +129,21 @@ class StreamRun {
       if (options_.full_every > 0) tracking->full_every = options_.full_every;
     }
     engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking);
-    people_ << "backend " << engine_->describe() << '\n';
+    const std::string backend = engine_->describe();
+    people_ << "backend " << backend << '\n';
+    const DetectorConfig sized = engine_->config_for(frame.image.width(), frame.image.height());
+    for (const auto& observer : options_.observers) {
+      observer->begin({frame.image.width(), frame.image.height(), sized, backend});
+    }
+  }
+
+  /// `digest`: of the result before its poses were scaled.
+  void tell_observers(const SourceFrame& frame, const FrameResult& result, u64 digest, const PipelineFrame* paced) {
+    if (options_.observers.empty()) return;
+    const std::optional<CameraModel> camera = camera_of(frame);
+    const ObservedFrame observed{frame.label, frame.image.view(), result, digest,      Mode::docking,
+                                 camera,      tracked_,           paced,  frame.truth, frame.truth_targets};
+    for (const auto& observer : options_.observers) observer->observe(observed);
   }
 
   void handle(const SourceFrame& frame) {
@@ -167,9 +182,11 @@ class StreamRun {
   /// ways are of the first round alone: what is played for hours must not fill the memory.
   void gather(const SourceFrame& frame, FrameResult& result, std::int64_t cpu_ns, const PipelineFrame* paced,
               bool first_round) {
+    const u64 digest = options_.observers.empty() ? 0 : digest_of(result);
     scale_poses(result.detections, frame.truth);
     find_systematic(frame, result);
     if (options_.filter) filter(frame, result, first_round);
+    tell_observers(frame, result, digest, paced);
     ++frames_;
     frames_with_markers_ += result.detections.empty() && !any_found(result.disc_targets) ? 0 : 1;
     overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
@@ -409,6 +426,7 @@ class StreamRun {
                       engine_->camera_for(picture_.width(), picture_.height()));
       people_ << "picture     " << options_.picture << '\n';
     }
+    for (const auto& observer : options_.observers) observer->finish(people_);
     people_.flush();
   }
 

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "berth/source.hpp"
 #include "console.hpp"
 #include "engine.hpp"
+#include "frame_observer.hpp"
 #include "paced_play.hpp"
 
 namespace berth::cli {
@@ -29,6 +32,8 @@ struct StreamOptions {
   std::uint64_t max_frames = 0;
   /// In real time, through a pipeline.
   PaceOptions pace;
+  /// They get every frame, whichever way it took.
+  std::vector<std::shared_ptr<FrameObserver>> observers;
 };
 
 /// What a stream came to.
