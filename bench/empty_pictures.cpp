@@ -148,8 +148,9 @@ cv::Mat text(Sheet& sheet) {
     int below = 0;
     const cv::Size box = cv::getTextSize(line, font, scale, thickness, &below);
     const int room = 2 + sheet.random.integer(0, 8);
-    cv::rectangle(image, cv::Rect(cv::Point(at) - cv::Point(room, box.height + room),
-                                  cv::Size(box.width + 2 * room, box.height + below + 2 * room)),
+    cv::rectangle(image,
+                  cv::Rect(cv::Point(at) - cv::Point(room, box.height + room),
+                           cv::Size(box.width + 2 * room, box.height + below + 2 * room)),
                   ink, thickness);
   }
   cv::Mat turned;
@@ -192,9 +193,8 @@ cv::Mat random_cells(Sheet& sheet) {
     const double dark = sheet.random.uniform(5, 120);
     const double light = dark + sheet.random.uniform(20, 130);
     const double share = sheet.random.uniform(0.2, 0.8);
-    const cv::Mat square = cells(sheet.random.integer(8, 33), [&](int /*x*/, int /*y*/) {
-      return sheet.random.chance(share) ? light : dark;
-    });
+    const cv::Mat square = cells(sheet.random.integer(8, 33),
+                                 [&](int /*x*/, int /*y*/) { return sheet.random.chance(share) ? light : dark; });
     sheet.place(image, square, sheet.random.uniform(40, 0.9 * sheet.size.height));
   }
   return image;

@@ -56,9 +56,7 @@ struct Count {
 struct Batch {
   std::string kind;
   int number = 0;
-  bool operator<(const Batch& other) const {
-    return kind != other.kind ? kind < other.kind : number < other.number;
-  }
+  bool operator<(const Batch& other) const { return kind != other.kind ? kind < other.kind : number < other.number; }
 };
 using Counts = std::map<Batch, Count>;
 
@@ -137,8 +135,8 @@ class Examiner {
   void keep(const EmptyPicture& picture, const std::string& name, const std::vector<Detection>& detections) {
     if (options_.evidence.empty() || name.empty()) return;
     for (const Detection& found : detections) {
-      const std::string path = fmt::format("{}/{}-{}-{}-{}bits.png", options_.evidence, name, found.family->name,
-                                           found.id, found.hamming);
+      const std::string path =
+          fmt::format("{}/{}-{}-{}-{}bits.png", options_.evidence, name, found.family->name, found.id, found.hamming);
       const View2D<const u8> view = picture.image.view();
       cv::imwrite(path, cv::Mat(view.height, view.width, CV_8U, const_cast<u8*>(view.row(0)),
                                 static_cast<std::size_t>(view.stride)));
@@ -157,11 +155,13 @@ void check_sight(Examiner& examiner, EmptyPictures& pictures, const std::vector<
   for (std::size_t i = 0; i < families.size(); ++i) {
     long found = 0;
     for (int n = 0; n < kPictures; ++n) {
-      EmptyPicture picture = pictures.make("families", static_cast<int>(i + families.size() * static_cast<std::size_t>(n)));
+      EmptyPicture picture =
+          pictures.make("families", static_cast<int>(i + families.size() * static_cast<std::size_t>(n)));
       picture.shown = nullptr;
       found += examiner.examine(picture, "").wrong[i];
     }
-    fmt::print(stderr, "{}: {} of its markers seen in {} pictures that show some\n", families[i]->name, found, kPictures);
+    fmt::print(stderr, "{}: {} of its markers seen in {} pictures that show some\n", families[i]->name, found,
+               kPictures);
     if (found < kPictures / 2) throw Error(families[i]->name + " is not seen where it is; nothing can be said of it");
   }
 }
@@ -226,8 +226,8 @@ void examine_all(const Options& options, Counts& done) {
         done[batch] = sum;
         ++finished;
         const double minutes = (ms_on(CLOCK_MONOTONIC) - start) / 60000;
-        fmt::print(stderr, "\r{} of {} batches of {}, {:.1f} min, {:.0f} to go ", finished, left.size(), kBatch, minutes,
-                   minutes / static_cast<double>(finished) * static_cast<double>(left.size() - finished));
+        fmt::print(stderr, "\r{} of {} batches of {}, {:.1f} min, {:.0f} to go ", finished, left.size(), kBatch,
+                   minutes, minutes / static_cast<double>(finished) * static_cast<double>(left.size() - finished));
       }
     } catch (const std::exception& error) {
       const std::lock_guard<std::mutex> lock(mutex);
@@ -248,7 +248,8 @@ int run(int argc, char** argv) {
   CLI::App app("How often a marker is seen where none is, each family by itself, at the default settings.");
   app.add_option("--backend", options.backend, "where frames are searched");
   app.add_option("--families", options.families, "families to look for")->delimiter(',');
-  app.add_option("--photos", photo_folder, "folder of photographs without markers (.png, .jpg, .pgm); parts of them are pictures, too")
+  app.add_option("--photos", photo_folder,
+                 "folder of photographs without markers (.png, .jpg, .pgm); parts of them are pictures, too")
       ->check(CLI::ExistingDirectory);
   app.add_option("--file", options.file, "what is done, a line for each thousand pictures; goes on there");
   app.add_option("--evidence", options.evidence, "folder for the pictures in which something was seen")

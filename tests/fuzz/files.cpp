@@ -1,0 +1,117 @@
+// Every file that Berth reads. A file that is read holds what its reader promises.
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <string>
+
+#include "berth/bundle.hpp"
+#include "berth/camera.hpp"
+#include "berth/disc_target.hpp"
+#include "berth/error.hpp"
+#include "berth/systematic_covariance.hpp"
+#include "camera/image_file.hpp"
+#include "crc32.hpp"
+#include "fuzz/targets.hpp"
+#include "navigation/network.hpp"
+#include "sim/scenario.hpp"
+#include "work/machine.hpp"
+
+namespace berth::fuzz {
+namespace {
+
+const std::string kFolder = "/proc/self/fd/";
+
+/// The bytes as a file that has a path, in memory.
+class MemoryFile {
+ public:
+  MemoryFile(const u8* bytes, std::size_t count) : descriptor_(memfd_create("fuzz", 0)) {
+    require(descriptor_ >= 0, "a file in memory can be made");
+    require(::write(descriptor_, bytes, count) == static_cast<ssize_t>(count), "it can be written");
+    path_ = kFolder + std::to_string(descriptor_);
+  }
+  ~MemoryFile() { close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  int descriptor_;
+  std::string path_;
+};
+
+template <typename Read>
+void read_as_file(const u8* bytes, std::size_t count, const Read& read) {
+  const MemoryFile file(bytes, count);
+  try {
+    read(file.path());
+  } catch (const Error& error) {
+    // This file, or one beside it that it refers to.
+    if (std::string(error.what()).find(kFolder) == std::string::npos) require(false, error.what());
+  }
+}
+
+void parse_bytes(const std::vector<u8>& file) {
+  try {
+    const Network network = parse_network(file.data(), file.size(), "network");
+    const std::vector<u8> written = network_bytes(network);
+    require(network_bytes(parse_network(written.data(), written.size(), "network")) == written,
+            "what is written is read again");
+  } catch (const Error&) {
+  }
+}
+
+}  // namespace
+
+void camera_file(const u8* bytes, std::size_t count) {
+  read_as_file(bytes, count, [](const std::string& path) {
+    const CameraModel camera = read_camera(path);
+    require(camera.width > 0 && camera.height > 0, "a camera has a size");
+    require(camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy),
+            "a camera has a focal length");
+    for (const double k : camera.distortion) require(std::isfinite(k), "distortion is finite");
+    read_calibration_deviation(path);
+  });
+}
+
+void bundle_file(const u8* bytes, std::size_t count) {
+  read_as_file(bytes, count, [](const std::string& path) {
+    for (const Bundle& bundle : read_bundles(path, 0.165)) bundle.check();
+  });
+}
+
+void disc_target_file(const u8* bytes, std::size_t count) {
+  read_as_file(bytes, count, [](const std::string& path) { read_disc_target(path).check(); });
+}
+
+void scenario_file(const u8* bytes, std::size_t count) {
+  read_as_file(bytes, count, [](const std::string& path) { open_scenario(path); });
+}
+
+void machine_file(const u8* bytes, std::size_t count) {
+  read_as_file(bytes, count, [](const std::string& path) { work::read_machine(path); });
+}
+
+void network_file(const u8* bytes, std::size_t count) {
+  std::vector<u8> file(bytes, bytes + count);
+  parse_bytes(file);
+  if (count < 20) return;
+  // With the size and the checksum that fit, a reader looks further.
+  const auto put = [&](std::size_t at, u32 word) {
+    for (std::size_t i = 0; i < 4; ++i) file[at + i] = static_cast<u8>(word >> (8 * i));
+  };
+  put(12, static_cast<u32>(count));
+  put(count - 4, crc32(file.data(), count - 4));
+  parse_bytes(file);
+}
+
+void image_file(const u8* bytes, std::size_t count) {
+  read_as_file(bytes, count, [](const std::string& path) {
+    const GrayImage image = read_gray_image(path);
+    require(image.width() > 0 && image.height() > 0, "an image that is read has a size");
+  });
+}
+
+}  // namespace berth::fuzz

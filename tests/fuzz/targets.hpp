@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "berth/types.hpp"
+
+/// What is run on bytes of which nothing is known: everything that reads what others wrote.
+namespace berth::fuzz {
+
+struct Target {
+  const char* name;
+  /// Returns on every input: an Error is an answer, anything else thrown, a sanitizer's complaint or an abort is a fault.
+  void (*run)(const u8* bytes, std::size_t count);
+  /// Whole inputs to begin with: globs below the repository's root; `tests/fuzz/corpus/NAME/*` comes on top.
+  std::vector<std::string> seeds;
+  /// How many cut or damaged seeds tests/fuzz_test.cpp tries: fewer where one takes long.
+  int inputs = 240;
+};
+
+const std::vector<Target>& targets();
+
+/// Ends the program, saying why; for what must hold whatever the input.
+void require(bool holds, const char* what);
+
+void camera_file(const u8* bytes, std::size_t count);
+void bundle_file(const u8* bytes, std::size_t count);
+void disc_target_file(const u8* bytes, std::size_t count);
+void scenario_file(const u8* bytes, std::size_t count);
+void machine_file(const u8* bytes, std::size_t count);
+void network_file(const u8* bytes, std::size_t count);
+void image_file(const u8* bytes, std::size_t count);
+void camera_pixels(const u8* bytes, std::size_t count);
+void marker_frame(const u8* bytes, std::size_t count);
+
+}  // namespace berth::fuzz
