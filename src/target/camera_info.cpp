@@ -13,6 +13,7 @@
 #include "berth/error.hpp"
 #include "berth/systematic_covariance.hpp"
 #include "target/camera_fields.hpp"
+#include "target/lens_name.hpp"
 #include "target/number_text.hpp"
 
 namespace berth {
@@ -50,17 +51,12 @@ void write_list(std::ostream& out, const char* field, int rows, int columns, con
   out << "]\n";
 }
 
-int coefficients_of(const CameraModel& camera) {
-  if (camera.lens == LensModel::equidistant) return 4;
-  const auto& d = camera.distortion;
-  return d[5] != 0 || d[6] != 0 || d[7] != 0 ? 8 : 5;
-}
-
 void write_distortion(std::ostream& out, const CameraModel& camera) {
-  const int count = coefficients_of(camera);
-  const char* const model = count == 4 ? "equidistant" : count == 8 ? "rational_polynomial" : "plumb_bob";
-  out << "distortion_model: " << model << "\n";
-  write_list(out, "distortion_coefficients", 1, count, {camera.distortion.begin(), camera.distortion.begin() + count});
+  const LensName lens = lens_name_of(camera);
+  const auto count = static_cast<std::ptrdiff_t>(lens.coefficients);
+  out << "distortion_model: " << lens.model << "\n";
+  write_list(out, "distortion_coefficients", 1, static_cast<int>(count),
+             {camera.distortion.begin(), camera.distortion.begin() + count});
 }
 
 // `more`: what follows the file's usual fields.
@@ -136,7 +132,7 @@ void write_camera_info(const std::string& path, const CameraModel& camera, const
   write_file(path, camera, name,
              std::string(kDeviations) + ":  # fx fy cx cy, px; the distortion's coefficients\n  pinhole: " +
                  list({deviation.fx, deviation.fy, deviation.cx, deviation.cy}) + "  distortion: " +
-                 list({d.begin(), d.begin() + static_cast<std::ptrdiff_t>(coefficients_of(camera))}));
+                 list({d.begin(), d.begin() + static_cast<std::ptrdiff_t>(lens_name_of(camera).coefficients)}));
 }
 
 }  // namespace berth
