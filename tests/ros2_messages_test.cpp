@@ -1,8 +1,6 @@
 // Messages of ROS 2 byte by byte, by hand; that they keep their memory; definitions. That other libraries read them is
 // shown by ros2/read_messages.py.
 
-#include "ros2/messages.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +10,7 @@
 #include <numeric>
 
 #include "quaternion.hpp"
+#include "ros2/messages.hpp"
 #include "ros2/sample_messages.hpp"
 #include "sim/geometry.hpp"
 #include "support/complaint.hpp"
@@ -107,10 +106,10 @@ TEST(Ros2Messages, TransformsAreASequenceOfStructures) {
   write(list, cdr);
   const std::string identity = std::string(kZero) + kZero + kZero + kZero + kZero + kZero + kOne;
   // From 4: times 4…12, "c" 12…18, to 20: "m" 20…26, to 32; and from 88: 88…96, 96…102, 104…110, to 112.
-  EXPECT_THAT(cdr.bytes(), ElementsAreArray(hex("00010000 02000000"
-                                                "00000000 00000000 02000000 6300 0000 02000000 6d00 000000000000" +
-                                                identity +
-                                                "00000000 00000000 02000000 6300 0000 02000000 6d00 0000" + identity)));
+  EXPECT_THAT(cdr.bytes(),
+              ElementsAreArray(hex("00010000 02000000"
+                                   "00000000 00000000 02000000 6300 0000 02000000 6d00 000000000000" +
+                                   identity + "00000000 00000000 02000000 6300 0000 02000000 6d00 0000" + identity)));
 }
 
 TEST(Ros2Messages, NothingSeenIsAnEmptySequence) {

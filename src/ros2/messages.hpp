@@ -13,8 +13,8 @@
 #include "ros2/cdr.hpp"
 
 /// Berth's results as ROS 2 messages (docs/ros2.md), for whatever sends or records them. A struct here borrows what it
-/// is made of; `write` makes a whole message of it, byte for byte what ROS 2 itself would send, and allocates only where
-/// the writer has never held one as long. Poses and axes are Berth's (docs/coordinate-frames.md), unchanged.
+/// is made of; `write` makes a whole message of it, byte for byte what ROS 2 itself would send, and allocates only
+/// where the writer has never held one as long. Poses and axes are Berth's (docs/coordinate-frames.md), unchanged.
 namespace berth::ros2 {
 
 /// Names the sort of message as recordings do: "geometry_msgs/msg/PoseStamped".

@@ -40,8 +40,9 @@ SampleMessages::SampleMessages() {
   transforms_.transforms = {{{1'500'000'000, "camera"}, "tag36h11:7", detection.pose},
                             {{1'500'000'000, "camera"}, "dock", detection.pose}};
   diagnostics_.header = {2'000'000'001, ""};
-  diagnostics_.status = {{Level::warn, "berth: camera", "12 frames dropped", "v4l2:video0", {{"dropped", "12"}, {"fps", "70.5"}}},
-                         {Level::ok, "berth: detector", "", "simd", {}}};
+  diagnostics_.status = {
+      {Level::warn, "berth: camera", "12 frames dropped", "v4l2:video0", {{"dropped", "12"}, {"fps", "70.5"}}},
+      {Level::ok, "berth: detector", "", "simd", {}}};
   pixels_ = {1, 2, 3, 99, 4, 5, 6, 99};
   cameras_.assign(3, paper_camera());
   cameras_[1].distortion[7] = 0.25;
