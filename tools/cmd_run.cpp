@@ -4,6 +4,7 @@
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
+#include "ros_options.hpp"
 #include "stream.hpp"
 #include "systematic_show.hpp"
 
@@ -22,6 +23,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source v4l2:video0,width=640,height=480,fps=120 --camera cam.yaml --size 0.08 --filter
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops
+  berth run --source v4l2:video0 --camera cam.yaml --size 0.08 --ros --ros-namespace robot1    to ROS 2 nodes
 
 Ctrl-C ends the stream cleanly, with its summary.)";
 
@@ -53,6 +55,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   struct Options {
     std::string source;
     StreamOptions stream;
+    RosOptions ros;
   };
   CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image, video or camera");
   const auto options = std::make_shared<Options>();
@@ -81,6 +84,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("N")
       ->capture_default_str();
   add_pace_options(*command, options->stream.pace);
+  add_ros_options(*command, options->ros);
   add_engine_options(*command, options->stream.engine);
   add_deviation_options(*command, options->stream.engine);
   add_stream_backend_options(*command, options->stream.engine);
@@ -94,6 +98,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
           "--track searches in windows, which show markers alone; --target needs whole frames: leave one of the two "
           "out");
     }
+    if (options->ros.on) options->stream.observers.push_back(make_ros_publisher(make_ros_plan(options->ros)));
     const std::unique_ptr<Source> source = open_source(options->source);
     exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;
   });
