@@ -7,6 +7,7 @@
 #include "flight_show.hpp"
 #include "output_file.hpp"
 #include "stream.hpp"
+#include "web_options.hpp"
 
 namespace berth::cli {
 namespace {
@@ -25,6 +26,7 @@ struct DemoCommand {
   FlightOptions flight;
   std::string scenario;
   std::uint64_t max_frames = 0;
+  WebOptions web;
 };
 
 int show_scenario(const DemoCommand& command, Console& console) {
@@ -37,6 +39,9 @@ int show_scenario(const DemoCommand& command, Console& console) {
   stream.log = (out / "log.jsonl").string();
   stream.svg = (out / "trajectory.svg").string();
   stream.picture = (out / "markers.png").string();
+  WebOptions web = command.web;
+  web.source = "sim:" + command.scenario;
+  add_web_observers(web, console.out(), stream.observers);
   console.out() << "scenario    " << command.scenario << '\n';
   return run_stream(*source, stream, console).with_markers > 0 ? kOk : kNoResult;
 }
@@ -61,6 +66,8 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--out", options->flight.out, "folder for the log and the pictures")
       ->type_name("DIR")
       ->capture_default_str();
+  add_report_option(*command, options->web);
+  command->get_option("--report")->needs(scenario);
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
     exit_code = options->scenario.empty() ? show_flight(options->flight, console) : show_scenario(*options, console);

@@ -7,6 +7,7 @@
 #include "ros_options.hpp"
 #include "stream.hpp"
 #include "systematic_show.hpp"
+#include "web_options.hpp"
 
 namespace berth::cli {
 namespace {
@@ -24,6 +25,8 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops
   berth run --source v4l2:video0 --camera cam.yaml --size 0.08 --ros --ros-namespace robot1    to ROS 2 nodes
+  berth run --source sim:scenarios/approach.toml --fps 30 --minutes 5 --filter --view    watched in a browser
+  berth run --source sim:scenarios/approach.toml --report approach.html    the run as one page
 
 Ctrl-C ends the stream cleanly, with its summary.)";
 
@@ -56,6 +59,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
     std::string source;
     StreamOptions stream;
     RosOptions ros;
+    WebOptions web;
   };
   CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image, video or camera");
   const auto options = std::make_shared<Options>();
@@ -83,6 +87,8 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str();
+  add_report_option(*command, options->web);
+  add_view_options(*command, options->web);
   add_pace_options(*command, options->stream.pace);
   add_ros_options(*command, options->ros);
   add_engine_options(*command, options->stream.engine);
@@ -100,6 +106,10 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
     }
     if (options->ros.on) options->stream.observers.push_back(make_ros_publisher(make_ros_plan(options->ros)));
     const std::unique_ptr<Source> source = open_source(options->source);
+    options->web.source = options->source;
+    options->web.is_filtered = options->stream.filter;
+    add_web_observers(options->web, options->stream.log == "-" ? console.err() : console.out(),
+                      options->stream.observers);
     exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;
   });
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -15,6 +16,8 @@
 #include "berth/tracker.hpp"
 
 namespace berth::cli {
+
+class MarkerFilters;
 
 /// What a stream is, as far as it is known before its first frame comes out.
 struct ObservedStream {
@@ -48,6 +51,16 @@ struct ObservedFrame {
   /// Only simulated sources know; empty otherwise.
   const std::vector<TruthMarker>& truth;
   const std::vector<TruthTarget>& truth_targets;
+  /// The backend that it was run on.
+  const char* backend = "";
+  /// Submitted until collected, by the wall clock, ns; 0 where it came through a pipeline.
+  std::int64_t wall_ns = 0;
+  /// What its camera has been through so far.
+  SourceHealth health;
+  /// The markers' tracks, this frame in them, where poses are filtered; null otherwise.
+  const MarkerFilters* filters = nullptr;
+  /// The pipeline's counts so far; null where there is none.
+  const PipelineCounts* counts = nullptr;
 };
 
 /// Whoever wants to have every frame of `berth run`: StreamOptions::observers. All calls come from one thread, the

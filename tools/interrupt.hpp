@@ -18,6 +18,8 @@ class InterruptWatch {
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;
   bool came() const { return interrupted_ != 0; }
+  /// As if SIGINT had come; from any thread.
+  static void ask() { interrupted_ = 1; }
 
  private:
   static inline volatile std::sig_atomic_t interrupted_ = 0;

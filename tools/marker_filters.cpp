@@ -45,6 +45,11 @@ void MarkerFilters::foretell(std::int64_t time_ns, const std::optional<CameraMod
   }
 }
 
+const FilteredPose* MarkerFilters::find(const std::string& family, int id) const {
+  const auto track = tracks_.find({family, id});
+  return track != tracks_.end() && track->second.pose.has_pose ? &track->second.pose : nullptr;
+}
+
 Json MarkerFilters::to_json() const {
   Json json = Json::array();
   for (const auto& [key, track] : tracks_) {

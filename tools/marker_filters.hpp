@@ -28,6 +28,8 @@ class MarkerFilters {
   /// Tells a tracker where the markers will be in its frame of that time, seen by that camera.
   void foretell(std::int64_t time_ns, const std::optional<CameraModel>& camera, Tracker& tracker) const;
 
+  /// The marker's track; null where it has none.
+  const FilteredPose* find(const std::string& family, int id) const;
   /// Every marker with a track: family, id, pose, velocity and what is known of them.
   Json to_json() const;
   /// As detections, to be compared with truth.

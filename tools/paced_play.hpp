@@ -54,6 +54,7 @@ class PacedPlay {
   /// What a result was made of, and whether it is of the first time round.
   const SourceFrame& source_of(const PipelineFrame& frame) const;
   bool is_first_round(const PipelineFrame& frame) const { return frame.result->stamp.sequence < frames_.size(); }
+  PipelineCounts counts() const { return pipeline_.counts(); }
   /// Ends the play early.
   void end() { ended_ = true; }
 

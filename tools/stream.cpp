@@ -80,6 +80,7 @@ class StreamRun {
     PacedPlay paced(std::move(frames), options_.pace, engine_->backends(), config);
     paced.describe(people_);
     people_.flush();
+    playing_ = &paced;
     paced.start();
     std::size_t backend = 0;
     while (const PipelineFrame* frame = paced.next()) {
@@ -93,6 +94,7 @@ class StreamRun {
       gather(source, result, 0, frame, paced.is_first_round(*frame));
       if (interrupt.came()) paced.end();
     }
+    playing_ = nullptr;
     view_.finish();
     sum_up(interrupt.came(), &paced);
   }
@@ -141,8 +143,24 @@ class StreamRun {
   void tell_observers(const SourceFrame& frame, const FrameResult& result, u64 digest, const PipelineFrame* paced) {
     if (options_.observers.empty()) return;
     const std::optional<CameraModel> camera = camera_of(frame);
-    const ObservedFrame observed{frame.label, frame.image.view(), result, digest,      Mode::docking,
-                                 camera,      tracked_,           paced,  frame.truth, frame.truth_targets};
+    PipelineCounts counts;
+    if (playing_ != nullptr) counts = playing_->counts();
+    const Backend& backend = paced != nullptr ? *engine_->backends()[paced->backend] : engine_->backend();
+    const ObservedFrame observed{frame.label,
+                                 frame.image.view(),
+                                 result,
+                                 digest,
+                                 Mode::docking,
+                                 camera,
+                                 tracked_,
+                                 paced,
+                                 frame.truth,
+                                 frame.truth_targets,
+                                 backend.name(),
+                                 paced != nullptr ? 0 : frame_ns_,
+                                 source_.health(),
+                                 options_.filter ? &filters_ : nullptr,
+                                 playing_ != nullptr ? &counts : nullptr};
     for (const auto& observer : options_.observers) observer->observe(observed);
   }
 
@@ -162,6 +180,7 @@ class StreamRun {
     if (timed.difference) report_difference(frame.label, *timed.difference);
     tracked_ = timed.tracked;
     if (tracked_ != nullptr) count_search(*tracked_, timed.cpu_ns);
+    frame_ns_ = timed.wall_ns;
     wall_ns_ += timed.wall_ns;
     cpu_ns_ += timed.cpu_ns;
     gather(frame, result, timed.cpu_ns, nullptr, true);
@@ -475,6 +494,8 @@ class StreamRun {
   };
   std::array<Searched, kSearchReasons> searches_;
   const TrackedFrame* tracked_ = nullptr;  // of the frame at hand
+  std::int64_t frame_ns_ = 0;              // its time by the wall clock
+  const PacedPlay* playing_ = nullptr;     // while frames come through a pipeline
   std::map<MarkerKey, std::vector<Trajectory::Point>> ways_;
   GrayImage picture_;
   std::vector<Detection> picture_detections_;

@@ -1,0 +1,321 @@
+// The page: what the server says, put where people look for it. Nothing old is shown as if it were live: values go when
+// their frame is too old, and the page says so in words and in colour.
+'use strict';
+(function (berth) {
+  const $ = (id) => document.getElementById(id);
+  const kKept = 12000;          // samples of an object
+  const kOldest = 130;          // s of them that plots can show
+  const kGone = 1.0;            // s without an event until the connection counts as lost
+  const kRankOf = {bundle: 0, target: 1, marker: 2};
+
+  const kAlarms = {
+    stale: ['NO LIVE DATA', (age) => 'The newest frame is ' + berth.duration(age) + ' old. What stood here has been taken away.'],
+    lost: ['NO CONNECTION', (age) => 'Nothing has come from Berth for ' + berth.duration(age) + '. Trying again by itself.'],
+    ended: ['THE RUN HAS ENDED', () => 'What is shown is its end; nothing here is live.'],
+  };
+
+  let about = {}, state = null, objects = [], tracks = [], chosen = -1, page = 'connecting', connectedOnce = false;
+  let spoken = 0, drawn = 0;
+
+  const video = new berth.Video($('video'), 'video.mjpg');
+  const plots = berth.axes.map((axis, i) => new berth.Plot($('plots'), axis, i));
+  const scene = new berth.Scene($('scene'), [...document.querySelectorAll('[data-view]')]);
+  const stream = new berth.Stream('events', {
+    about: (message) => {
+      if (about.run && about.run !== message.run) note('another run');
+      about = message;
+      objects = [];
+      tracks = [];
+      chosen = -1;
+      video.forget();
+      scene.clear();
+      scene.about(about);
+      $('object').length = 1;
+      $('source').textContent = about.source;
+      $('source').title = about.source;
+      $('control').hidden = !about.control;
+      $('about').textContent = 'Berth ' + about.version + (about.control ? '' : ' · read-only');
+    },
+    connection: (isThere) => {
+      if (isThere && connectedOnce) note('connected again');
+      if (!isThere && connectedOnce && page !== 'ended') note('connection lost');
+      connectedOnce = connectedOnce || isThere;
+    },
+    state: take,
+  });
+
+  function take(message) {
+    const before = state;
+    state = message;
+    (message.objects || []).forEach((object, i) => {
+      const at = message.objects_from + i;
+      objects[at] = object;
+      tracks[at] = [];
+      $('object').add(new Option(object.name, String(at)));
+    });
+    (message.samples || []).forEach((array) => {
+      const sample = berth.sample(array), track = tracks[sample.object];
+      track.push(sample);
+      if (track.length > kKept) track.splice(0, track.length - kKept);
+    });
+    if (message.samples) scene.dirty = true;
+    if (message.times) showTimes(message.times);
+    if (before && before.frames && message.frames) compare(before, message);
+  }
+
+  /// What changed from one state to the next and is worth a line.
+  function compare(a, b) {
+    if (a.frames > b.frames) return;
+    if (a.mode !== b.mode) note('mode: ' + b.mode);
+    if (a.backend !== b.backend) note('backend: ' + b.backend);
+    if (b.camera.reopened > a.camera.reopened) note('the camera was opened again');
+    if (b.camera.lost > a.camera.lost) note(b.camera.lost - a.camera.lost + ' frames lost before they came');
+    if (b.overflows > a.overflows) note('a list ran full in ' + (b.overflows - a.overflows) + ' frames');
+    if (b.pipeline && a.pipeline && b.pipeline.run_again > a.pipeline.run_again) note('the device was lost; frames were run again');
+  }
+
+  function note(text) {
+    const item = document.createElement('li'), time = document.createElement('time');
+    time.textContent = new Date().toLocaleTimeString([], {hour12: false});
+    item.append(time, text);
+    $('log').prepend(item);
+    while ($('log').children.length > 50) $('log').lastChild.remove();
+  }
+
+  // ---- what is live ----
+
+  const gap = () => Math.max(0.3, 3 / Math.max(0.1, state.fps || 1));
+  const limit = () => Math.max(0.5, Math.min(3, 4 / Math.max(0.1, state.fps || 1)));
+  const age = () => (state && state.frames ? Math.max(0, stream.now() - state.captured) : null);
+
+  function judge() {
+    if (!state || stream.silence() > kGone) return state && state.ended ? 'ended' : connectedOnce ? 'lost' : 'connecting';
+    if (state.ended) return 'ended';
+    if (!state.frames) return 'waiting';
+    return age() > limit() ? 'stale' : 'live';
+  }
+
+  /// The object's newest sample, where the newest frame shows it; or null.
+  function seen(at) {
+    const track = tracks[at] || [], last = track[track.length - 1];
+    return last && state.finished - last.time <= Math.max(0.25, 2.5 / Math.max(0.1, state.fps || 1)) ? last : null;
+  }
+  const last = (at) => (tracks[at] && tracks[at].length ? tracks[at][tracks[at].length - 1] : null);
+
+  /// The object that everything is about: the one asked for, else what docking goes by, as long as it is there.
+  function choose() {
+    if ($('object').value !== '') {
+      chosen = Number($('object').value);
+      return;
+    }
+    if (chosen >= 0 && state.frames && last(chosen) && state.finished - last(chosen).time < 3) return;
+    let best = -1;
+    const better = (a, b) => kRankOf[objects[a].kind] - kRankOf[objects[b].kind] || objects[b].size - objects[a].size || a - b;
+    objects.forEach((object, i) => {
+      if (seen(i) && (best < 0 || better(i, best) < 0)) best = i;
+    });
+    if (best >= 0) chosen = best;
+  }
+
+  // ---- what is shown ----
+
+  function say(id, text) { if ($(id).textContent !== text) $(id).textContent = text; }
+  function grade(id, name) {
+    ['good', 'warn', 'bad'].forEach((one) => $(id).classList.toggle(one, one === name));
+  }
+
+  function showState() {
+    const now = judge();
+    if (now !== page && (now === 'stale' || now === 'lost')) note(now === 'stale' ? 'data went stale' : 'nothing comes from Berth');
+    if (now !== page && page === 'stale' && now === 'live') note('data are live again');
+    page = now;
+    document.documentElement.dataset.state = page;
+    say('pill', {connecting: 'Connecting', waiting: 'Waiting for a frame', live: 'Live', stale: 'Stale', lost: 'No connection', ended: 'Ended'}[page]);
+    const alarm = kAlarms[page], since = page === 'lost' ? stream.silence() : age();
+    $('alarm').hidden = !alarm;
+    $('alarm').classList.toggle('calm', page === 'ended');
+    if (alarm) {
+      say('alarm-title', alarm[0]);
+      // Aloud once and then every few seconds, not with each tenth.
+      if (berth.now() - spoken > 1 || $('alarm-text').textContent === '') {
+        say('alarm-text', alarm[1](since));
+        spoken = berth.now();
+      }
+    } else {
+      say('alarm-text', '');
+    }
+  }
+
+  function showGlance() {
+    const sample = page === 'live' && chosen >= 0 ? seen(chosen) : null, name = chosen >= 0 ? objects[chosen].name : '';
+    say('range', sample ? berth.measured(sample.range, sample.rangeDeviation, 4) : '—');
+    say('range-sub', sample ? '± ' + berth.length(sample.rangeDeviation) : '\u00a0');
+    const speed = sample && sample.closing !== null ? sample.closing * 1000 : null;
+    say('closing-name', speed !== null && speed < 0 ? 'Drawing away' : 'Closing');
+    say('closing', speed === null ? '—' : berth.fixed(Math.abs(speed), Math.abs(speed) < 100 ? 1 : 0));
+    say('closing-sub', speed === null ? (sample ? 'takes half a second of poses' : '\u00a0') :
+      '± ' + berth.fixed((sample.closingDeviation || 0) * 1000, 1) + ' mm/s' + (speed > 1 && sample.range > 0 ? ', ' + berth.duration(sample.range / (speed / 1000)) + ' left' : ''));
+    showPose(sample, name);
+    const old = page === 'lost' ? stream.silence() : age();
+    const isSlow = old !== null && old >= 1;
+    say('age', old === null || page === 'ended' ? '—' : isSlow ? berth.fixed(old, 1) : String(Math.round(old * 1000)));
+    say('age-unit', isSlow ? 's' : 'ms');
+    say('age-sub', old === null ? '\u00a0' : state.captured_known ? 'since mid-exposure' : 'since the frame was done');
+    grade('age-card', page === 'live' ? '' : page === 'stale' || page === 'lost' ? 'bad' : '');
+    document.title = (page === 'live' ? (sample ? berth.fixed(sample.range, 3) + ' m' : 'not seen') : $('pill').textContent.toUpperCase()) + ' · Berth';
+  }
+
+  function showPose(sample, name) {
+    const before = chosen >= 0 ? last(chosen) : null;
+    if (page === 'stale' || page === 'lost') {
+      say('pose', page === 'stale' ? 'STALE' : 'UNKNOWN');
+      say('pose-sub', 'no pose is shown');
+      return grade('pose-card', 'bad');
+    }
+    if (page !== 'live') {
+      say('pose', '—');
+      say('pose-sub', '\u00a0');
+      return grade('pose-card', '');
+    }
+    if (!sample) {
+      say('pose', 'NOT SEEN');
+      say('pose-sub', before ? name + ': last ' + berth.duration(state.finished - before.time) + ' ago' : 'no object has had a pose');
+      return grade('pose-card', 'warn');
+    }
+    const isDoubtful = sample.ambiguity > 0.6;
+    say('pose', isDoubtful ? 'AMBIGUOUS' : 'VALID');
+    say('pose-sub', name + (isDoubtful ? ': tilted the other way it fits nearly as well' : sample.error === null ? '' : ', fits to ' + berth.fixed(sample.error, 2) + ' px'));
+    grade('pose-card', isDoubtful ? 'warn' : 'good');
+  }
+
+  function showPlots() {
+    const span = Number($('span').value), to = page === 'ended' ? state.finished : stream.now();
+    const track = tracks[chosen] || [], sample = page === 'live' && chosen >= 0 ? seen(chosen) : null;
+    plots.forEach((plot) => {
+      plot.draw(track, to - Math.min(span, kOldest), to, gap(), berth.ago);
+      plot.read(sample);
+    });
+    say('plots-note', chosen < 0 ? '' : objects[chosen].name + (about.filtered ? ', closing speed filtered' : ''));
+    scene.show(track, sample, chosen >= 0 ? objects[chosen].size : 0, gap());
+  }
+
+  function showCards() {
+    const s = state;
+    if (!s.frames) return;
+    say('mode', s.mode);
+    say('search', s.search);
+    say('why', s.why || 'markers are not followed (--track)');
+    say('backend', about.backend && about.backend.startsWith(s.backend) ? about.backend : s.backend);
+    say('frames', berth.count(s.frames) + ', ' + berth.fixed(100 * s.with_pose / s.frames, 1) + ' % with a pose');
+    say('rate', page === 'live' ? berth.fixed(s.fps, 1) + ' frames/s' : '—');
+    say('label', s.label);
+    const p = s.pipeline;
+    if (p) {
+      const dropped = Object.entries(p.dropped).filter(([, n]) => n > 0);
+      say('drops', berth.count(p.offered) + ' offered, ' + (dropped.length ? dropped.map(([why, n]) => berth.count(n) + ' dropped for ' + why).join(', ') : 'none dropped') +
+        '; late: ' + p.late.map(berth.count).join(', '));
+    } else {
+      say('drops', 'Frame by frame: none is dropped.');
+    }
+    showHealth(s);
+    showSeen();
+  }
+
+  function showHealth(s) {
+    const lines = [];
+    const camera = s.camera, total = camera.lost + camera.incomplete;
+    lines.push(s.status === 'device_lost' ? ['bad', 'the device is lost'] : ['', 'device: ' + s.backend]);
+    lines.push(total ? ['warn', 'camera: ' + camera.lost + ' lost, ' + camera.incomplete + ' incomplete'] : ['', 'camera: no frame lost']);
+    if (camera.reopened) lines.push(['warn', 'camera opened again ' + camera.reopened + ' ×']);
+    if (camera.skipped) lines.push(['', berth.count(camera.skipped) + ' frames skipped for newer ones']);
+    if (s.overflows) lines.push(['warn', 'lists ran full in ' + berth.count(s.overflows) + ' frames']);
+    if (s.pipeline && s.pipeline.run_again) lines.push(['warn', berth.count(s.pipeline.run_again) + ' frames run again on another backend']);
+    lines.push(['', 'viewers: ' + s.viewers.events + (s.viewers.refused ? ', ' + s.viewers.refused + ' turned away' : '')]);
+    if (video.refused) lines.push(['warn', 'too many watch the video; trying again']);
+    const text = JSON.stringify(lines);
+    if ($('health').dataset.text === text) return;
+    $('health').dataset.text = text;
+    $('health').replaceChildren(...lines.map(([name, words]) => {
+      const item = document.createElement('li');
+      item.className = name;
+      item.textContent = words;
+      return item;
+    }));
+  }
+
+  function showSeen() {
+    $('seen').replaceChildren(...objects.map((object, i) => {
+      const row = document.createElement('tr'), sample = page === 'live' ? seen(i) : null, before = last(i);
+      row.className = i === chosen ? 'chosen' : '';
+      [object.name, sample ? berth.measured(sample.range, sample.rangeDeviation, 4) : '—', sample ? berth.fixed(sample.error, 2) : '—',
+        sample ? 'now' : before && page !== 'lost' ? berth.duration(state.finished - before.time) + ' ago' : '—'].forEach((text) => { row.insertCell().textContent = text; });
+      return row;
+    }));
+  }
+
+  function showTimes(rows) {
+    $('times').replaceChildren(...rows.map((row) => {
+      const line = document.createElement('tr');
+      row.forEach((cell, i) => { line.insertCell().textContent = i === 0 ? cell : berth.fixed(cell, cell < 10 ? 2 : 1); });
+      return line;
+    }));
+  }
+
+  function showVideo() {
+    if (!$('video-on').checked) say('video-note', 'off');
+    else if (!video.picture) say('video-note', '');
+    const picture = video.picture, old = picture ? Math.max(0, stream.now() - picture.about.captured) : null;
+    const isLive = page === 'live' && $('video-on').checked && old !== null && old <= limit() + 0.5;
+    if (picture && $('video-on').checked) say('video-note', picture.about.width + ' × ' + picture.about.height + (isLive ? ', ' + Math.round(old * 1000) + ' ms old' : ''));
+    video.overlay = $('overlay-on').checked;
+    video.draw(isLive, old);
+  }
+
+  function tick() {
+    showState();
+    if (!state || document.hidden) return;
+    choose();
+    showGlance();
+    if (video.fresh || page !== 'live' || berth.now() - drawn > 0.25) {
+      video.fresh = false;
+      showVideo();
+    }
+    if (berth.now() - drawn < 0.09) return;
+    drawn = berth.now();
+    showPlots();
+    showCards();
+    scene.draw();
+  }
+
+  // ---- what people do ----
+
+  berth.theme($('theme'), () => scene.colours());
+  $('clear').addEventListener('click', () => {
+    tracks = tracks.map(() => []);
+    scene.clear();
+  });
+  const watch = () => ($('video-on').checked && !document.hidden ? video.start() : video.stop());
+  $('video-on').addEventListener('change', watch);
+  document.addEventListener('visibilitychange', watch);
+  $('control-form').addEventListener('submit', async (event) => {
+    event.preventDefault();
+    const button = $('end-run');
+    if (!button.classList.contains('sure')) {
+      button.classList.add('sure');
+      button.textContent = 'Press again to end it';
+      setTimeout(() => {
+        button.classList.remove('sure');
+        button.textContent = 'End the run';
+      }, 4000);
+      return;
+    }
+    try {
+      const answer = await fetch('control', {method: 'POST', headers: {Authorization: 'Bearer ' + $('token').value, 'Content-Type': 'application/json'}, body: '{"do":"end"}'});
+      say('control-note', (await answer.text()).trim());
+    } catch (e) {
+      say('control-note', 'Berth did not answer.');
+    }
+  });
+  watch();
+  setInterval(tick, 50);
+})(window.berth);

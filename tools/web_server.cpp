@@ -1,0 +1,439 @@
+// The only file that knows the HTTP library.
+#include "web_server.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <httplib.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <deque>
+#include <thread>
+
+#include "berth/error.hpp"
+#include "pipeline/thread_setup.hpp"
+#include "web_assets.hpp"
+#include "web_connection.hpp"
+
+namespace berth::cli {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// Between two events to a viewer, while frames come and while none do.
+constexpr milliseconds kEventEvery(80), kBeatEvery(250);
+/// A picture is sent again after this time without another: a viewer that has gone shows.
+constexpr milliseconds kRepeatEvery(2000);
+constexpr std::size_t kSamplesAnEvent = 512;
+constexpr u64 kHistory = 6000;
+constexpr double kTimesEveryS = 1;
+/// What whoever tries tokens waits for each.
+constexpr milliseconds kWrongTokenWait(300);
+constexpr const char* kBoundary = "berthpicture";
+
+/// Set on the thread that accepts while it turns a connection away.
+thread_local bool is_refusing = false;
+
+void become_a_servant() {
+  name_thread("berth-view");
+  make_ordinary();
+  // The stream goes first. Where that is not allowed, the thread is like any other.
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
+}
+
+/// Threads made when they are first needed. What comes while all of them are busy is turned away at once.
+class Workers final : public httplib::TaskQueue {
+ public:
+  explicit Workers(std::atomic<u64>& refused) : refused_(refused) {}
+
+  void enqueue(std::function<void()> job) override {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (under_way_ < WebServer::kMostConnections) {
+        ++under_way_;
+        jobs_.push_back(std::move(job));
+        if (jobs_.size() > static_cast<std::size_t>(idle_)) threads_.emplace_back([this] { work(); });
+        more_.notify_one();
+        return;
+      }
+    }
+    ++refused_;
+    is_refusing = true;
+    job();
+    is_refusing = false;
+  }
+
+  void shutdown() override {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_over_ = true;
+    }
+    more_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+ private:
+  void work() {
+    become_a_servant();
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true) {
+      ++idle_;
+      more_.wait(lock, [this] { return is_over_ || !jobs_.empty(); });
+      --idle_;
+      if (jobs_.empty()) return;
+      const std::function<void()> job = std::move(jobs_.front());
+      jobs_.pop_front();
+      lock.unlock();
+      job();
+      lock.lock();
+      --under_way_;
+    }
+  }
+
+  std::atomic<u64>& refused_;
+  std::mutex mutex_;
+  std::condition_variable more_;
+  std::deque<std::function<void()>> jobs_;
+  std::vector<std::thread> threads_;
+  int idle_ = 0, under_way_ = 0;
+  bool is_over_ = false;
+};
+
+/// A connection as the HTTP library wants it.
+class Connection final : public httplib::Stream {
+ public:
+  explicit Connection(WebConnection& connection) : connection_(connection) {}
+  bool is_readable() const override { return connection_.is_readable(); }
+  bool is_writable() const override { return connection_.is_writable(); }
+  ssize_t read(char* to, std::size_t size) override { return connection_.read(to, size); }
+  ssize_t write(const char* from, std::size_t size) override { return connection_.write(from, size); }
+  void get_remote_ip_and_port(std::string& ip, int& port) const override { connection_.name_end(true, ip, port); }
+  void get_local_ip_and_port(std::string& ip, int& port) const override { connection_.name_end(false, ip, port); }
+  socket_t socket() const override { return connection_.socket(); }
+
+ private:
+  WebConnection& connection_;
+};
+
+/// One request a connection, within bounds of size and time; the library has none for the headers as a whole.
+class Listener final : public httplib::Server {
+ private:
+  bool process_and_close_socket(socket_t socket) override {
+    WebConnection connection(socket, WebServer::kMostHead + WebServer::kMostBody);
+    if (is_refusing) {
+      connection.refuse();
+      return false;
+    }
+    Connection stream(connection);
+    bool closed = false;
+    return process_request(stream, true, closed, nullptr);
+  }
+};
+
+/// Names by which this machine may be asked for. Others are a stranger's page that made its own name point here.
+bool is_host_known(std::string host) {
+  if (!host.empty() && host.front() == '[') {
+    host = host.substr(1, host.find(']') - 1);
+  } else {
+    host = host.substr(0, host.find(':'));
+  }
+  std::array<unsigned char, sizeof(in6_addr)> binary = {};
+  if (inet_pton(AF_INET, host.c_str(), binary.data()) == 1 || inet_pton(AF_INET6, host.c_str(), binary.data()) == 1) {
+    return true;
+  }
+  std::transform(host.begin(), host.end(), host.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::array<char, 256> name = {};
+  gethostname(name.data(), name.size() - 1);
+  std::string own = name.data();
+  std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return std::tolower(c); });
+  return host == "localhost" || (!own.empty() && (host == own || host == own + ".local"));
+}
+
+/// In a time that does not tell how much of it is right.
+bool is_same(const std::string& a, const std::string& b) {
+  unsigned different = a.size() == b.size() ? 0 : 1;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    different |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i % std::max<std::size_t>(1, b.size())]);
+  }
+  return different == 0;
+}
+
+void answer(httplib::Response& response, int status, const std::string& text) {
+  response.status = status;
+  response.set_content(text + "\n", "text/plain; charset=utf-8");
+}
+
+std::string event(const char* name, const Json& data) {
+  return std::string("event: ") + name + "\ndata: " + to_line(data) + "\n\n";
+}
+
+}  // namespace
+
+WebAddress parse_web_address(const std::string& text) {
+  WebAddress address;
+  const auto complain = [&] {
+    return Error("--view " + text + ": give ADDRESS:PORT, e.g. 127.0.0.1:8040, or 0.0.0.0:8040 for every network");
+  };
+  if (text.empty()) return address;
+  std::string host = text, port;
+  const std::size_t bracket = text.rfind(']'), colon = text.rfind(':');
+  if (text.front() == '[') {
+    if (bracket == std::string::npos || (bracket + 1 < text.size() && colon != bracket + 1)) throw complain();
+    host = text.substr(1, bracket - 1);
+    if (bracket + 1 < text.size()) port = text.substr(bracket + 2);
+  } else if (colon != std::string::npos) {
+    host = text.substr(0, colon);
+    port = text.substr(colon + 1);
+    if (port.empty()) throw complain();
+  } else if (text.find_first_not_of("0123456789") == std::string::npos) {
+    host.clear();
+    port = text;
+  }
+  if (!host.empty()) address.host = host;
+  if (!port.empty()) {
+    if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos) throw complain();
+    address.port = std::stoi(port);
+  }
+  if (address.port > 65535 || address.host.find_first_of(" /[]") != std::string::npos) throw complain();
+  return address;
+}
+
+struct WebServer::Impl {
+  Impl(const WebAddress& address_asked, WebContent content_given)
+      : address(address_asked), content(std::move(content_given)) {}
+
+  /// Takes one of the streams there may be at once; null when there is none left. Given back by the last copy.
+  std::shared_ptr<void> take(std::atomic<int>& streams) {
+    if (++streams > kMostStreams) {
+      --streams;
+      ++refused;
+      return nullptr;
+    }
+    return {&streams, [](std::atomic<int>* taken) { --*taken; }};
+  }
+
+  void set_up() {
+    server.new_task_queue = [this] { return new Workers(refused); };
+    server.set_payload_max_length(kMostBody);
+    server.set_keep_alive_max_count(1);
+    // Without the library's SO_REUSEPORT, by which two runs could share a port unawares.
+    server.set_socket_options([](socket_t socket) {
+      const int yes = 1;
+      setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    });
+    server.set_default_headers(
+        {{"Cache-Control", "no-store"},
+         {"Content-Security-Policy",
+          "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+          "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+         {"Referrer-Policy", "no-referrer"},
+         {"X-Content-Type-Options", "nosniff"}});
+    server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
+      if (is_host_known(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
+      answer(response, 421, "this page is served by its address or this machine's name only; open it by one of those");
+      return httplib::Server::HandlerResponse::Handled;
+    });
+    server.set_exception_handler([](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
+      answer(response, 500, "this request failed");
+    });
+    server.set_error_handler([](const httplib::Request&, httplib::Response& response) {
+      if (response.body.empty()) answer(response, response.status, httplib_status(response.status));
+    });
+    for (const WebAsset& asset : web_assets()) {
+      if (!asset.is_served) continue;
+      const std::string path = asset.name == "view.html" ? "/" : "/" + asset.name;
+      std::string pattern;
+      for (const char c : path) pattern += c == '.' ? "\\." : std::string(1, c);
+      server.Get(pattern, [&asset](const httplib::Request&, httplib::Response& response) {
+        response.set_content(asset.bytes.data(), asset.bytes.size(), asset.type);
+      });
+    }
+    server.Get("/state\\.json", [this](const httplib::Request&, httplib::Response& response) {
+      Json json = {{"about", content.about()}, {"state", state()}, {"times", content.times()}};
+      response.set_content(to_line(json) + "\n", "application/json");
+    });
+    server.Get("/events", [this](const httplib::Request&, httplib::Response& response) { send_events(response); });
+    server.Get("/video\\.mjpg", [this](const httplib::Request&, httplib::Response& response) { send_video(response); });
+    server.Post("/control", [this](const httplib::Request& request, httplib::Response& response) {
+      control(request, response);
+    });
+  }
+
+  static std::string httplib_status(int status) {
+    switch (status) {
+      case 400: return "the request makes no sense";
+      case 404: return "there is nothing of that name here";
+      case 413: return "the request is too large";
+      case 414: return "the address is too long";
+      default: return fmt::format("status {}", status);
+    }
+  }
+
+  Json state() const {
+    WebFeed& feed = *content.feed;
+    const bool ended = feed.has_ended();  // before the status: none comes after it
+    Json json = to_json(feed.status(), feed.now_s(), ended);
+    json["viewers"] = {{"events", event_streams.load()}, {"video", video_streams.load()}, {"refused", refused.load()}};
+    return json;
+  }
+
+  /// What one viewer of the events has been told.
+  struct Told {
+    u64 about = 0, cursor = 0, frames = 0;
+    std::size_t objects = 0;
+    double sent_s = -1e9, times_s = -1e9;
+    bool ended = false;
+  };
+
+  void send_events(httplib::Response& response) {
+    const std::shared_ptr<void> slot = take(event_streams);
+    if (!slot) return refuse_stream(response);
+    auto told = std::make_shared<Told>();
+    told->cursor = content.feed->newest() > kHistory ? content.feed->newest() - kHistory : 0;
+    response.set_chunked_content_provider("text/event-stream",
+                                          [this, slot, told](std::size_t, httplib::DataSink& sink) {
+                                            return send_event(*told, sink);
+                                          });
+  }
+
+  /// At most one event. False ends the connection.
+  bool send_event(Told& told, httplib::DataSink& sink) {
+    WebFeed& feed = *content.feed;
+    if (feed.is_closed()) {
+      sink.done();
+      return true;
+    }
+    std::string text;
+    if (const u64 version = content.about_version(); version != told.about) {
+      told.about = version;
+      text += event("about", content.about());
+    }
+    Json json = state();
+    const std::vector<WebSample> samples = feed.samples(told.cursor, kSamplesAnEvent);
+    const std::vector<WebObject> objects = feed.objects(told.objects);
+    const u64 frames = json["frames"];
+    const bool ended = json["ended"];
+    const double now_s = feed.now_s();
+    const bool is_news = frames != told.frames || ended != told.ended || !samples.empty() || !objects.empty();
+    if (is_news || now_s - told.sent_s > std::chrono::duration<double>(kBeatEvery).count()) {
+      if (!objects.empty()) {
+        json["objects"] = to_json(objects);
+        json["objects_from"] = told.objects;
+      }
+      for (const WebSample& sample : samples) json["samples"].push_back(to_json(sample));
+      if (now_s - told.times_s > kTimesEveryS || ended) {
+        json["times"] = content.times();
+        told.times_s = now_s;
+      }
+      text += event("state", json);
+      told.objects += objects.size();
+      told.frames = frames;
+      told.ended = ended;
+      told.sent_s = now_s;
+    }
+    if (!text.empty() && !sink.write(text.data(), text.size())) return false;
+    if (samples.size() < kSamplesAnEvent) feed.sleep(kEventEvery);
+    return true;
+  }
+
+  void send_video(httplib::Response& response) {
+    const std::shared_ptr<void> slot = take(video_streams);
+    if (!slot) return refuse_stream(response);
+    const auto sent = std::make_shared<std::shared_ptr<const WebPicture>>();
+    response.set_content_provider(std::string("multipart/x-mixed-replace; boundary=") + kBoundary,
+                                  [this, slot, sent](std::size_t, httplib::DataSink& sink) {
+                                    return send_picture(*sent, sink);
+                                  });
+  }
+
+  /// The newest picture there is: a slow viewer misses those between, and nobody waits for it.
+  bool send_picture(std::shared_ptr<const WebPicture>& sent, httplib::DataSink& sink) {
+    const std::shared_ptr<const WebPicture> next = content.feed->picture(sent ? sent->number : 0, kRepeatEvery);
+    if (content.feed->is_closed()) {
+      sink.done();
+      return true;
+    }
+    const bool is_repeated = !next && sent;
+    if (next) sent = next;
+    if (!sent) return sink.write("\r\n", 2);  // before the first boundary anything may stand
+    const std::string head =
+        fmt::format("--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\nX-Berth-Repeated: {}\r\nX-Berth-Picture: {}\r\n\r\n",
+                    kBoundary, sent->jpeg.size(), is_repeated ? 1 : 0, sent->about);
+    return sink.write(head.data(), head.size()) && sink.write(sent->jpeg.data(), sent->jpeg.size()) &&
+           sink.write("\r\n", 2);
+  }
+
+  static void refuse_stream(httplib::Response& response) {
+    response.set_header("Retry-After", "5");
+    answer(response, 503, fmt::format("{} viewers are watching, which is the most; close one", kMostStreams));
+  }
+
+  void control(const httplib::Request& request, httplib::Response& response) {
+    if (content.token.empty()) {
+      return answer(response, 403, "this view is read-only; start berth with --view-token to change that");
+    }
+    if (!is_same(request.get_header_value("Authorization"), "Bearer " + content.token)) {
+      content.feed->sleep(kWrongTokenWait);
+      response.set_header("WWW-Authenticate", "Bearer");
+      return answer(response, 401, "the token is missing or wrong");
+    }
+    const Json body = Json::parse(request.body, nullptr, false);
+    if (!body.is_object() || body.value("do", Json()) != "end") {
+      return answer(response, 400, "give {\"do\":\"end\"}");
+    }
+    content.end_run();
+    answer(response, 200, "the run ends");
+  }
+
+  WebAddress address;
+  WebContent content;
+  std::atomic<int> event_streams = 0, video_streams = 0;
+  std::atomic<u64> refused = 0;
+  Listener server;
+  std::thread thread;
+};
+
+WebServer::WebServer(const WebAddress& address, WebContent content)
+    : impl_(std::make_unique<Impl>(address, std::move(content))) {
+  impl_->set_up();
+  WebAddress& bound = impl_->address;
+  if (bound.port == 0) {
+    bound.port = impl_->server.bind_to_any_port(bound.host);
+  } else if (!impl_->server.bind_to_port(bound.host, bound.port)) {
+    bound.port = -1;
+  }
+  if (bound.port <= 0) {
+    throw Error(fmt::format("--view {}:{}: cannot be listened on: another program does, or the address is not this "
+                            "machine's; give another port, or 0 for any",
+                            address.host, address.port));
+  }
+  impl_->thread = std::thread([this] {
+    become_a_servant();
+    impl_->server.listen_after_bind();
+  });
+  // The library's stop does nothing before it listens.
+  while (!impl_->server.is_running()) std::this_thread::sleep_for(milliseconds(1));
+}
+
+WebServer::~WebServer() {
+  impl_->content.feed->close();
+  impl_->server.stop();
+  impl_->thread.join();
+}
+
+int WebServer::port() const { return impl_->address.port; }
+
+std::string WebServer::url() const {
+  const WebAddress& address = impl_->address;
+  const bool is_v6 = address.host.find(':') != std::string::npos;
+  return fmt::format(is_v6 ? "http://[{}]:{}/" : "http://{}:{}/", address.host, address.port);
+}
+
+int WebServer::event_streams() const { return impl_->event_streams; }
+int WebServer::video_streams() const { return impl_->video_streams; }
+u64 WebServer::refused() const { return impl_->refused; }
+
+}  // namespace berth::cli
