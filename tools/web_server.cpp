@@ -120,6 +120,10 @@ class Connection final : public httplib::Stream {
 
 /// One request a connection, within bounds of size and time; the library has none for the headers as a whole.
 class Listener final : public httplib::Server {
+ public:
+  /// The library's own queue of five loses connections that come at once.
+  void widen_queue() { ::listen(svr_sock_, WebServer::kMostConnections); }
+
  private:
   bool process_and_close_socket(socket_t socket) override {
     WebConnection connection(socket, WebServer::kMostHead + WebServer::kMostBody);
@@ -410,6 +414,7 @@ WebServer::WebServer(const WebAddress& address, WebContent content)
                             "machine's; give another port, or 0 for any",
                             address.host, address.port));
   }
+  impl_->server.widen_queue();
   impl_->thread = std::thread([this] {
     become_a_servant();
     impl_->server.listen_after_bind();

@@ -32,7 +32,7 @@ window.berth = window.berth || {};
   function length(metres) {
     if (metres === null || metres === undefined) return 'not known';
     const mm = metres * 1000;
-    return mm >= 1000 ? fixed(metres, 2) + ' m' : fixed(mm, mm < 1 ? 3 : mm < 10 ? 2 : 1) + ' mm';
+    return mm >= 1000 ? fixed(metres, 2) + ' m' : fixed(mm, mm < 1 ? 3 : mm < 10 ? 2 : mm < 100 ? 1 : 0) + ' mm';
   }
 
   function duration(seconds) {

@@ -144,7 +144,7 @@
         c.moveTo(at, kTop);
         c.lineTo(at, bottom);
         c.stroke();
-        c.textAlign = at > right - 20 ? 'right' : at < kLeft + 20 ? 'left' : 'center';
+        c.textAlign = at > right - 20 ? 'right' : 'center';
         c.fillText(text, at, height - 4);
       }
     }

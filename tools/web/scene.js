@@ -25,8 +25,7 @@
       this.parent = parent;
       this.way = [];
       this.view = 'orbit';
-      this.turn = {around: -0.75, up: 0.5, zoom: 1};
-      this.reach = 0.5;
+      this.turn = {around: -0.95, up: 0.42, zoom: 1};
       this.dirty = true;
       try {
         this.renderer = new THREE.WebGLRenderer({antialias: true, alpha: true});
@@ -146,7 +145,7 @@
     look(view) {
       this.view = view;
       this.turn.zoom = 1;
-      if (view === 'orbit') Object.assign(this.turn, {around: -0.75, up: 0.5});
+      if (view === 'orbit') Object.assign(this.turn, {around: -0.95, up: 0.42});
       this.buttons.forEach((button) => button.setAttribute('aria-pressed', String(button.dataset.view === view)));
       this.dirty = true;
     }
@@ -197,18 +196,25 @@
       }
       const box = this.bounds();
       this.build(box);
-      this.aim(box);
+      this.aim(this.bounds(true));
       this.renderer.render(this.scene, this.camera);
       this.label(width, height);
     }
 
-    /// Of the way, the camera and the square.
-    bounds() {
+    /// Of the way, the camera and the square; with the ground beneath them, all that is drawn.
+    bounds(isAll) {
       const box = new THREE.Box3();
       box.expandByPoint(new THREE.Vector3(0, 0, 0));
       this.way.forEach((s) => box.expandByPoint(place(s.value)));
       if (this.live) this.corners(this.live).forEach((p) => box.expandByPoint(place(p)));
       if (this.way.length === 0) box.expandByPoint(new THREE.Vector3(0, 0, -0.5));
+      if (isAll) {
+        const far = this.pyramidDepth(box);
+        box.min.y = Math.min(-this.ground, -0.4 * far);
+        box.max.y = Math.max(box.max.y, 0.4 * far);
+        box.min.x = Math.min(box.min.x, -0.5 * far);
+        box.max.x = Math.max(box.max.x, 0.5 * far);
+      }
       return box;
     }
 
@@ -218,7 +224,8 @@
     }
 
     build(box) {
-      const floor = -(box.min.y - 0.12 * Math.max(0.1, box.max.z - box.min.z));  // y down again
+      const floor = -(box.min.y - 0.1 * Math.max(0.1, box.max.z - box.min.z));  // y down again
+      this.ground = floor;
       const pairs = [], shadow = [];
       for (let i = 1; i < this.way.length; ++i) {
         const a = this.way[i - 1], b = this.way[i];
@@ -258,8 +265,10 @@
       this.legend.textContent = 'squares of ' + berth.length(step);
     }
 
+    pyramidDepth(box) { return Math.max(0.04, 0.1 * (box.max.z - box.min.z)); }
+
     pyramid(box) {
-      const far = Math.max(0.05, 0.14 * (box.max.z - box.min.z));
+      const far = this.pyramidDepth(box);
       const p = this.pinhole || {camera: [1, 1, 0.5, 0.4], width: 1, height: 0.8};
       const [fx, fy, cx, cy] = p.camera;
       const corner = (u, v) => [(u - cx) / fx * far, (v - cy) / fy * far, far];
@@ -269,23 +278,42 @@
       this.set(this.lines.frustum, pairs);
     }
 
+    /// Looks at all of it from where it is asked to, as near as it fits; nearer only when half the room is empty, since
+    /// what moves is the object and not the ground.
     aim(box) {
-      const centre = box.getCenter(new THREE.Vector3()), size = box.getSize(new THREE.Vector3());
-      const radius = Math.max(0.08, size.length() / 2);
-      // Larger at once, smaller in steps: what moves is the object, not the ground.
-      if (radius > this.reach || radius < 0.55 * this.reach) this.reach = radius * 1.08;
-      const distance = this.reach / Math.sin(19 * Math.PI / 180) * this.turn.zoom * Math.max(1, 1 / this.camera.aspect);
       const {around, up} = this.turn;
       const from = {
         orbit: new THREE.Vector3(Math.sin(around) * Math.cos(up), Math.sin(up), Math.cos(around) * Math.cos(up)),
-        top: new THREE.Vector3(0, 1, 0.0001), side: new THREE.Vector3(1, 0, 0), camera: new THREE.Vector3(0, 0, 1),
+        top: new THREE.Vector3(0, 1, 0.0001), side: new THREE.Vector3(1, 0, 0.0001), camera: new THREE.Vector3(0, 0.0001, 1),
       }[this.view];
-      this.camera.position.copy(centre).addScaledVector(from, distance * (this.view === 'orbit' ? 0.86 : 1));
-      this.camera.near = distance / 100;
-      this.camera.far = distance * 20;
-      this.camera.updateProjectionMatrix();
-      this.camera.lookAt(centre);
-      this.camera.updateMatrixWorld();
+      const centre = box.getCenter(new THREE.Vector3());
+      let distance = Math.max(0.2, box.getSize(new THREE.Vector3()).length() * 1.5);
+      const stand = (at) => {
+        this.camera.position.copy(at).addScaledVector(from, distance);
+        this.camera.near = distance / 200;
+        this.camera.far = distance * 40;
+        this.camera.updateProjectionMatrix();
+        this.camera.lookAt(at);
+        this.camera.updateMatrixWorld();
+      };
+      const points = [];
+      for (const x of [box.min.x, box.max.x]) for (const y of [box.min.y, box.max.y]) for (const z of [box.min.z, box.max.z]) points.push(new THREE.Vector3(x, y, z));
+      for (let i = 0; i < 4; ++i) {
+        stand(centre);
+        const seen = points.map((p) => p.clone().project(this.camera));
+        const xs = seen.map((p) => p.x), ys = seen.map((p) => p.y);
+        const middle = new THREE.Vector3((Math.min(...xs) + Math.max(...xs)) / 2, (Math.min(...ys) + Math.max(...ys)) / 2, centre.clone().project(this.camera).z);
+        const half = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)) / 2;
+        centre.copy(middle.unproject(this.camera));
+        distance *= Math.max(0.2, half / 0.82);
+      }
+      const kept = this.kept;
+      if (!kept || kept.view !== this.view || distance > kept.distance || distance < 0.6 * kept.distance ||
+          centre.distanceTo(kept.centre) > 0.12 * distance || kept.turn !== around + '/' + up) {
+        this.kept = {view: this.view, turn: around + '/' + up, distance: distance * 1.04, centre};
+      }
+      distance = this.kept.distance * this.turn.zoom;
+      stand(this.kept.centre);
     }
 
     label(width, height) {

@@ -14,7 +14,7 @@
     ended: ['THE RUN HAS ENDED', () => 'What is shown is its end; nothing here is live.'],
   };
 
-  let about = {}, state = null, objects = [], tracks = [], chosen = -1, page = 'connecting', connectedOnce = false;
+  let about = {}, state = null, objects = [], tracks = [], chosen = -1, page = 'connecting', connected = false, connectedOnce = false;
   let spoken = 0, drawn = 0;
 
   const video = new berth.Video($('video'), 'video.mjpg');
@@ -37,8 +37,9 @@
       $('about').textContent = 'Berth ' + about.version + (about.control ? '' : ' · read-only');
     },
     connection: (isThere) => {
-      if (isThere && connectedOnce) note('connected again');
-      if (!isThere && connectedOnce && page !== 'ended') note('connection lost');
+      if (connectedOnce && isThere) note('connected again');
+      if (connectedOnce && connected && !isThere && page !== 'ended') note('connection lost');
+      connected = isThere;
       connectedOnce = connectedOnce || isThere;
     },
     state: take,
@@ -126,7 +127,7 @@
 
   function showState() {
     const now = judge();
-    if (now !== page && (now === 'stale' || now === 'lost')) note(now === 'stale' ? 'data went stale' : 'nothing comes from Berth');
+    if (now !== page && now === 'stale') note('data went stale');
     if (now !== page && page === 'stale' && now === 'live') note('data are live again');
     page = now;
     document.documentElement.dataset.state = page;
