@@ -198,6 +198,7 @@
       this.build(box);
       this.aim(this.bounds(true));
       this.renderer.render(this.scene, this.camera);
+      this.parent.dataset.seen = [this.view, this.turn.around.toFixed(2), this.turn.up.toFixed(2), this.turn.zoom.toFixed(2)].join(' ');
       this.label(width, height);
     }
 
