@@ -11,7 +11,8 @@ namespace berth::fuzz {
 
 struct Target {
   const char* name;
-  /// Returns on every input: an Error is an answer, anything else thrown, a sanitizer's complaint or an abort is a fault.
+  /// Returns on every input: an Error is an answer, anything else thrown, a sanitizer's complaint or an abort is a
+  /// fault.
   void (*run)(const u8* bytes, std::size_t count);
   /// Whole inputs to begin with: globs below the repository's root; `tests/fuzz/corpus/NAME/*` comes on top.
   std::vector<std::string> seeds;
