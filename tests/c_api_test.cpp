@@ -1,0 +1,439 @@
+// include/berth.h against the C++ interface that it wraps, its rules for errors and structs, and what libberth.so
+// shows.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "berth.h"
+#include "berth/detector.hpp"
+#include "berth/pose_filter.hpp"
+#include "berth/source.hpp"
+#include "camera/image_file.hpp"
+#include "sim/scenario.hpp"
+#include "support/command_run.hpp"
+#include "support/counted_allocations.hpp"
+
+namespace berth {
+namespace {
+
+using testing::ElementsAreArray;
+using testing::HasSubstr;
+
+const std::string kRoot = BERTH_SOURCE_DIR;
+constexpr double kSide_m = 0.1;
+
+struct Close {
+  void operator()(berth_backend* handle) const { berth_backend_close(handle); }
+  void operator()(berth_settings* handle) const { berth_settings_free(handle); }
+  void operator()(berth_detector* handle) const { berth_detector_close(handle); }
+  void operator()(berth_filter* handle) const { berth_filter_close(handle); }
+};
+template <class T>
+using Handle = std::unique_ptr<T, Close>;
+
+template <class T>
+T empty() {
+  T value{};
+  value.struct_size = sizeof(T);
+  return value;
+}
+
+/// What a command prints, and its exit status.
+std::pair<std::string, int> output_of(const std::string& command) {
+  std::FILE* output = popen(command.c_str(), "r");
+  std::string text;
+  char part[4096];
+  while (std::fgets(part, sizeof part, output) != nullptr) text += part;
+  return {text, pclose(output)};
+}
+
+GrayImage photo() { return read_gray_image(BERTH_TEST_DATA "/tag36h11_7.png"); }
+
+Handle<berth_settings> settings_for(int width, int height) {
+  berth_error error{};
+  Handle<berth_settings> settings(berth_settings_new(&error));
+  berth_camera camera = empty<berth_camera>();
+  berth_camera_paper(&camera, width, height, &error);
+  berth_settings_set_camera(settings.get(), &camera, &error);
+  berth_settings_set_marker_size(settings.get(), kSide_m, &error);
+  EXPECT_EQ(error.code, BERTH_OK) << error.message;
+  return settings;
+}
+
+Handle<berth_detector> detector_of(const berth_settings* settings, int width, int height) {
+  berth_error error{};
+  // Closed before the detector, which may go on.
+  const Handle<berth_backend> backend(berth_backend_open("simd", nullptr, &error));
+  Handle<berth_detector> detector(berth_detector_open(backend.get(), settings, width, height, &error));
+  EXPECT_EQ(error.code, BERTH_OK) << error.message;
+  return detector;
+}
+
+void expect_pose(const berth_pose& pose, const Pose& expected) {
+  EXPECT_THAT(pose.R, ElementsAreArray(expected.R));
+  EXPECT_THAT(pose.t, ElementsAreArray(expected.t));
+}
+
+void expect_estimate(const berth_pose_estimate& estimate, const Pose& pose, const PoseUncertainty& uncertainty) {
+  expect_pose(estimate.pose, pose);
+  EXPECT_EQ(estimate.has_covariance, 1);
+  EXPECT_THAT(estimate.covariance, ElementsAreArray(uncertainty.covariance));
+  EXPECT_EQ(estimate.error_px, uncertainty.error_px);
+  EXPECT_EQ(estimate.ambiguity, uncertainty.ambiguity());
+  ASSERT_EQ(estimate.has_other, uncertainty.has_other ? 1 : 0);
+  if (!uncertainty.has_other) return;
+  expect_pose(estimate.other, uncertainty.other);
+  EXPECT_THAT(estimate.other_covariance, ElementsAreArray(uncertainty.other_covariance));
+  EXPECT_EQ(estimate.other_error_px, uncertainty.other_error_px);
+  EXPECT_EQ(estimate.other_excess, uncertainty.other_excess);
+}
+
+TEST(CApi, TheExamplePrintsThePose) {
+  const GrayImage image = photo();
+  const test::ScratchFolder folder;
+  const std::string header = "P5\n" + std::to_string(image.width()) + " " + std::to_string(image.height()) + "\n255\n";
+  const std::string pixels(reinterpret_cast<const char*>(image.view().data),
+                           static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()));
+  const auto [text, status] = output_of(std::string(BERTH_C_EXAMPLE) + " " + folder.write("dock.pgm", header + pixels));
+  EXPECT_EQ(status, 0);
+
+  const auto backend = open_backend("simd");
+  DetectorConfig config;
+  config.camera = paper_camera(image.width(), image.height());
+  config.marker_size_m = kSide_m;
+  Detector detector(*backend, image.width(), image.height(), config);
+  const Detection& marker = detector.detect(image.view()).detections.at(0);
+  char line[100];
+  std::snprintf(line, sizeof line, "tag36h11 7 at %.4f %.4f %.4f m\n", marker.pose.t[0], marker.pose.t[1],
+                marker.pose.t[2]);
+  EXPECT_EQ(text, line);
+}
+
+TEST(CApi, MarkersBundlesAndFilteredPosesAreTheCppInterfacesToTheBit) {
+  const auto source = open_scenario(kRoot + "/scenarios/nested.toml");
+  const CameraModel camera = *source->camera();
+  DetectorConfig config;
+  config.families.clear();
+  config.camera = camera;
+  config.bundles = read_bundles(kRoot + "/bundles/nested.yaml");
+  for (const BundleMarker& marker : config.bundles.at(0).markers) config.families.push_back(marker.family->name);
+  config.corner_method = CornerMethod::photometric;
+  const auto backend = open_backend("simd");
+  Detector detector(*backend, camera.width, camera.height, config);
+
+  berth_error error{};
+  const Handle<berth_settings> settings(berth_settings_new(&error));
+  berth_camera lens = empty<berth_camera>();
+  lens.width = camera.width;
+  lens.height = camera.height;
+  lens.fx = camera.fx;
+  lens.fy = camera.fy;
+  lens.cx = camera.cx;
+  lens.cy = camera.cy;
+  std::copy(camera.distortion.begin(), camera.distortion.end(), lens.distortion);
+  berth_settings_set_camera(settings.get(), &lens, &error);
+  for (const std::string& name : config.families) berth_settings_add_family(settings.get(), name.c_str(), &error);
+  // The bundle by numbers, as the file has them.
+  const Bundle& bundle = config.bundles.front();
+  berth_settings_add_bundle(settings.get(), bundle.name.c_str(), bundle.deviation_m, &error);
+  for (const BundleMarker& marker : bundle.markers) {
+    berth_pose place;
+    std::copy(marker.pose.R.begin(), marker.pose.R.end(), place.R);
+    std::copy(marker.pose.t.begin(), marker.pose.t.end(), place.t);
+    berth_settings_add_bundle_marker(settings.get(), marker.family->name.c_str(), marker.id, marker.size_m, &place,
+                                     &error);
+  }
+  berth_settings_set_corner_method(settings.get(), BERTH_CORNERS_PHOTOMETRIC, &error);
+  const Handle<berth_detector> twin = detector_of(settings.get(), camera.width, camera.height);
+
+  const PoseFilterConfig filter_config{camera, bundle.markers.front().size_m};
+  PoseFilter filter(filter_config);
+  berth_filter_settings filter_settings = empty<berth_filter_settings>();
+  filter_settings.camera = &lens;
+  filter_settings.marker_size_m = filter_config.marker_size_m;
+  const Handle<berth_filter> filter_twin(berth_filter_open(&filter_settings, &error));
+
+  for (int i = 0; i < 3; ++i) {
+    const SourceFrame frame = source->next().value();
+    const FrameResult& result = detector.detect(frame.image.view(), frame.stamp);
+    berth_stamp stamp = empty<berth_stamp>();
+    stamp.sequence = frame.stamp.sequence;
+    stamp.mid_exposure_ns = frame.stamp.mid_exposure_ns;
+    berth_detector_detect(twin.get(), frame.image.view().data, static_cast<std::size_t>(camera.width), &stamp, &error);
+    berth_frame said = empty<berth_frame>();
+    berth_detector_frame(twin.get(), &said, &error);
+    ASSERT_EQ(error.code, BERTH_OK) << error.message;
+    EXPECT_EQ(said.status, BERTH_FRAME_OK);
+    EXPECT_EQ(said.sequence, frame.stamp.sequence);
+    EXPECT_EQ(said.mid_exposure_ns, frame.stamp.mid_exposure_ns);
+    EXPECT_GT(said.corners_ns, 0);
+    ASSERT_EQ(said.markers, result.detections.size());
+    ASSERT_GT(said.markers, 0u);
+    for (std::size_t k = 0; k < said.markers; ++k) {
+      const Detection& d = result.detections[k];
+      berth_marker marker = empty<berth_marker>();
+      ASSERT_EQ(berth_detector_marker(twin.get(), k, &marker, &error), BERTH_OK);
+      EXPECT_EQ(marker.family, d.family->name);
+      EXPECT_EQ(marker.id, d.id);
+      EXPECT_EQ(marker.hamming, d.hamming);
+      EXPECT_EQ(marker.margin, d.margin);
+      for (std::size_t c = 0; c < 4; ++c) EXPECT_THAT(marker.corners[c], ElementsAreArray(d.corners[c]));
+      EXPECT_THAT(marker.center, ElementsAreArray(d.center));
+      EXPECT_THAT(marker.corner_covariance, ElementsAreArray(*d.corner_covariance_px2));
+      EXPECT_EQ(marker.corners_fitted, d.corner_fit ? 1 : 0);
+      EXPECT_EQ(marker.has_pose, d.has_pose ? 1 : 0);
+      if (d.has_pose) expect_estimate(marker.pose, d.pose, *d.pose_uncertainty);
+    }
+    ASSERT_EQ(said.bundles, 1u);
+    berth_bundle_pose board = empty<berth_bundle_pose>();
+    berth_detector_bundle(twin.get(), 0, &board, &error);
+    EXPECT_EQ(board.name, bundle.name);
+    ASSERT_EQ(board.has_pose, 1);
+    EXPECT_EQ(board.used, result.bundles[0].used);
+    expect_estimate(board.pose, result.bundles[0].pose, result.bundles[0].uncertainty);
+
+    const Detection& seen = result.detections.front();
+    berth_marker marker = empty<berth_marker>();
+    berth_detector_marker(twin.get(), 0, &marker, &error);
+    const FilteredPose& expected = filter.update(frame.stamp.mid_exposure_ns, &seen);
+    berth_filtered_pose filtered = empty<berth_filtered_pose>();
+    berth_filter_update(filter_twin.get(), frame.stamp.mid_exposure_ns, &marker, &filtered, &error);
+    ASSERT_EQ(error.code, BERTH_OK) << error.message;
+    EXPECT_EQ(filtered.has_pose, 1);
+    EXPECT_EQ(filtered.measured, expected.measured ? 1 : 0);
+    expect_pose(filtered.pose, expected.pose);
+    EXPECT_THAT(filtered.covariance, ElementsAreArray(expected.covariance));
+    EXPECT_THAT(filtered.velocity, ElementsAreArray(expected.velocity));
+    EXPECT_THAT(filtered.velocity_covariance, ElementsAreArray(expected.velocity_covariance));
+  }
+  const std::int64_t later = 1'000'000'000;
+  berth_filtered_pose foretold = empty<berth_filtered_pose>();
+  berth_filter_foretell(filter_twin.get(), later, &foretold, &error);
+  expect_pose(foretold.pose, filter.foretell(later).pose);
+  EXPECT_EQ(foretold.measured, 0);
+  berth_filter_reset(filter_twin.get(), &error);
+  berth_filter_foretell(filter_twin.get(), later, &foretold, &error);
+  EXPECT_EQ(foretold.has_pose, 0);
+}
+
+TEST(CApi, ATargetOfDiscsHasThePoseOfTheCppInterface) {
+  const auto source = open_scenario(kRoot + "/scenarios/port.toml");
+  const CameraModel camera = *source->camera();
+  DetectorConfig config;
+  config.camera = camera;
+  config.disc_targets = {read_disc_target(kRoot + "/targets/port.yaml")};
+  const auto backend = open_backend("simd");
+  Detector detector(*backend, camera.width, camera.height, config);
+  const SourceFrame frame = source->next().value();
+  const DiscPose& expected = detector.detect(frame.image.view()).disc_targets.at(0);
+  ASSERT_TRUE(expected.has_pose);
+
+  berth_error error{};
+  const test::ScratchFolder folder;
+  write_camera_info(folder / "camera.yaml", camera);
+  berth_camera lens = empty<berth_camera>();
+  berth_camera_read(&lens, (folder / "camera.yaml").c_str(), &error);
+  const Handle<berth_settings> settings(berth_settings_new(&error));
+  berth_settings_set_camera(settings.get(), &lens, &error);
+  berth_settings_read_target(settings.get(), (kRoot + "/targets/port.yaml").c_str(), &error);
+  const Handle<berth_detector> twin = detector_of(settings.get(), camera.width, camera.height);
+  berth_detector_detect(twin.get(), frame.image.view().data, static_cast<std::size_t>(camera.width), nullptr, &error);
+  berth_target_pose target = empty<berth_target_pose>();
+  berth_detector_target(twin.get(), 0, &target, &error);
+  ASSERT_EQ(error.code, BERTH_OK) << error.message;
+  EXPECT_EQ(target.name, config.disc_targets[0].name);
+  EXPECT_EQ(target.has_pose, 1);
+  EXPECT_EQ(target.used, expected.used);
+  expect_estimate(target.pose, expected.pose, expected.uncertainty);
+}
+
+TEST(CApi, RowsMayBeFurtherApartThanTheyAreLong) {
+  const GrayImage image = photo();
+  const std::size_t width = static_cast<std::size_t>(image.width()), stride = width + 13;
+  std::vector<u8> padded(stride * static_cast<std::size_t>(image.height()), 255);
+  for (int y = 0; y < image.height(); ++y) {
+    std::memcpy(&padded[static_cast<std::size_t>(y) * stride], image.view().row(y), width);
+  }
+  const Handle<berth_settings> settings = settings_for(image.width(), image.height());
+  const Handle<berth_detector> detector = detector_of(settings.get(), image.width(), image.height());
+  berth_marker near_marker = empty<berth_marker>(), far_marker = empty<berth_marker>();
+  berth_detector_detect(detector.get(), image.view().data, width, nullptr, nullptr);
+  ASSERT_EQ(berth_detector_marker(detector.get(), 0, &near_marker, nullptr), BERTH_OK);
+  berth_detector_detect(detector.get(), padded.data(), stride, nullptr, nullptr);
+  ASSERT_EQ(berth_detector_marker(detector.get(), 0, &far_marker, nullptr), BERTH_OK);
+  EXPECT_EQ(std::memcmp(near_marker.corners, far_marker.corners, sizeof near_marker.corners), 0);
+}
+
+TEST(CApi, FramesAllocateNothingAndMarkersThatAreFollowedNeitherDo) {
+  // So much larger than the marker that a window is worth it.
+  GrayImage image(960, 720);
+  std::fill_n(image.view().data, 960 * 720, u8{128});
+  const GrayImage middle = photo();
+  for (int y = 0; y < middle.height(); ++y) std::memcpy(image.view().row(y + 240) + 320, middle.view().row(y), 320);
+  const Handle<berth_settings> settings = settings_for(image.width(), image.height());
+  ASSERT_EQ(berth_settings_set_tracking(settings.get(), 100, nullptr), BERTH_OK);
+  const Handle<berth_detector> detector = detector_of(settings.get(), image.width(), image.height());
+  EXPECT_GT(berth_detector_device_bytes(detector.get()), 0u);
+  berth_error error{};
+  berth_stamp stamp = empty<berth_stamp>();
+  berth_frame frame = empty<berth_frame>();
+  berth_marker marker = empty<berth_marker>();
+  const auto look = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      stamp.mid_exposure_ns += 10'000'000;
+      berth_detector_detect(detector.get(), image.view().data, static_cast<std::size_t>(image.width()), &stamp, &error);
+      berth_detector_frame(detector.get(), &frame, &error);
+      berth_detector_marker(detector.get(), 0, &marker, &error);
+    }
+  };
+  look(2);
+  const std::size_t before = test::allocations();
+  look(10);
+  EXPECT_EQ(test::allocations(), before);
+  ASSERT_EQ(error.code, BERTH_OK) << error.message;
+  EXPECT_EQ(frame.whole, 0);
+  EXPECT_EQ(marker.id, 7);
+}
+
+TEST(CApi, TheFirstFailureStaysAndNullHandlesAreNoCrash) {
+  berth_error error{};
+  berth_backend* backend = berth_backend_open("quantum", nullptr, &error);
+  EXPECT_EQ(backend, nullptr);
+  EXPECT_EQ(error.code, BERTH_SETUP_FAILED);
+  const std::string first = error.message;
+  EXPECT_THAT(first, HasSubstr("no backend 'quantum'"));
+  EXPECT_EQ(berth_detector_open(backend, nullptr, 640, 480, &error), nullptr);
+  EXPECT_EQ(berth_detector_detect(nullptr, nullptr, 0, nullptr, &error), BERTH_BAD_ARGUMENT);
+  EXPECT_EQ(berth_detector_markers(nullptr), 0u);
+  EXPECT_EQ(berth_backend_description(nullptr), nullptr);
+  EXPECT_EQ(error.message, first);
+  error.code = BERTH_OK;
+  EXPECT_EQ(berth_settings_add_family(nullptr, "tag36h11", &error), BERTH_BAD_ARGUMENT);
+  EXPECT_STREQ(error.message, "settings is NULL");
+  berth_detector_close(nullptr);
+  berth_settings_free(nullptr);
+  berth_backend_close(nullptr);
+  berth_filter_close(nullptr);
+}
+
+TEST(CApi, WhatIsWrongIsNamedWithItsRemedy) {
+  const Handle<berth_settings> settings = settings_for(320, 240);
+  const Handle<berth_backend> backend(berth_backend_open(nullptr, nullptr, nullptr));
+  ASSERT_NE(backend, nullptr);
+  EXPECT_THAT(berth_backend_description(backend.get()), HasSubstr(" on "));
+  const Handle<berth_detector> detector(berth_detector_open(backend.get(), settings.get(), 320, 240, nullptr));
+  const GrayImage image = photo();
+  const auto expect = [](berth_code code, const char* part, auto call) {
+    berth_error error{};
+    call(&error);
+    EXPECT_EQ(error.code, code) << error.message;
+    EXPECT_THAT(error.message, HasSubstr(part));
+  };
+  berth_marker marker = empty<berth_marker>();
+  expect(BERTH_BAD_ARGUMENT, "there is no frame yet; call berth_detector_detect first",
+         [&](berth_error* error) { berth_detector_marker(detector.get(), 0, &marker, error); });
+  ASSERT_EQ(berth_detector_detect(detector.get(), image.view().data, 320, nullptr, nullptr), BERTH_OK);
+  expect(BERTH_BAD_ARGUMENT, "marker 1 is not there; the frame has 1",
+         [&](berth_error* error) { berth_detector_marker(detector.get(), 1, &marker, error); });
+  expect(BERTH_BAD_ARGUMENT, "stride is 319 bytes; rows have 320",
+         [&](berth_error* error) { berth_detector_detect(detector.get(), image.view().data, 319, nullptr, error); });
+  expect(BERTH_BAD_ARGUMENT, "pixels is NULL",
+         [&](berth_error* error) { berth_detector_detect(detector.get(), nullptr, 320, nullptr, error); });
+  expect(BERTH_BAD_ARGUMENT, "marker->struct_size is 0; set it to sizeof the struct", [&](berth_error* error) {
+    berth_marker forgotten{};
+    berth_detector_marker(detector.get(), 0, &forgotten, error);
+  });
+  expect(BERTH_SETUP_FAILED, "the camera is for images of 320x240, the detector for 640x480",
+         [&](berth_error* error) { berth_detector_open(backend.get(), settings.get(), 640, 480, error); });
+  expect(BERTH_SETUP_FAILED, "tag36h11",
+         [&](berth_error* error) { berth_settings_add_family(settings.get(), "tag36h12", error); });
+  expect(BERTH_SETUP_FAILED, "/nowhere/camera.yaml", [&](berth_error* error) {
+    berth_camera camera = empty<berth_camera>();
+    berth_camera_read(&camera, "/nowhere/camera.yaml", error);
+  });
+  expect(BERTH_BAD_ARGUMENT, "camera: width and height", [&](berth_error* error) {
+    berth_camera camera = empty<berth_camera>();
+    berth_settings_set_camera(settings.get(), &camera, error);
+  });
+  expect(BERTH_BAD_ARGUMENT, "begin one with berth_settings_add_bundle", [&](berth_error* error) {
+    const berth_pose place{};
+    berth_settings_add_bundle_marker(settings.get(), "tag36h11", 0, 0.1, &place, error);
+  });
+  expect(BERTH_SETUP_FAILED, "pose filter: marker_size_m is", [&](berth_error* error) {
+    berth_filter_settings filter = empty<berth_filter_settings>();
+    berth_camera camera = empty<berth_camera>();
+    berth_camera_paper(&camera, 320, 240, error);
+    filter.camera = &camera;
+    berth_filter_open(&filter, error);
+  });
+}
+
+TEST(CApi, AProgramOfALaterVersionGetsWhatThisOneKnows) {
+  struct LaterFrame {
+    berth_frame known;
+    std::uint64_t later;
+  };
+  struct LaterStamp {
+    berth_stamp known;
+    std::uint64_t later;
+  };
+  const GrayImage image = photo();
+  const Handle<berth_settings> settings = settings_for(320, 240);
+  const Handle<berth_detector> detector = detector_of(settings.get(), 320, 240);
+  LaterStamp stamp{};
+  stamp.known.struct_size = sizeof stamp;
+  stamp.known.sequence = 5;
+  ASSERT_EQ(berth_detector_detect(detector.get(), image.view().data, 320, &stamp.known, nullptr), BERTH_OK);
+  LaterFrame frame{};
+  frame.known.struct_size = sizeof frame;
+  frame.later = 99;
+  ASSERT_EQ(berth_detector_frame(detector.get(), &frame.known, nullptr), BERTH_OK);
+  EXPECT_EQ(frame.known.sequence, 5u);
+  EXPECT_EQ(frame.known.struct_size, sizeof frame);
+  EXPECT_EQ(frame.later, 0u);
+  stamp.later = 1;
+  berth_error error{};
+  EXPECT_EQ(berth_detector_detect(detector.get(), image.view().data, 320, &stamp.known, &error), BERTH_BAD_ARGUMENT);
+  EXPECT_THAT(error.message, HasSubstr("stamp has members that this library"));
+}
+
+TEST(CApi, NamesAreListed) {
+  std::vector<std::string> backends, families;
+  for (std::size_t i = 0; berth_backend_name(i) != nullptr; ++i) backends.emplace_back(berth_backend_name(i));
+  for (std::size_t i = 0; berth_family_name(i) != nullptr; ++i) families.emplace_back(berth_family_name(i));
+  EXPECT_EQ(backends, backend_names());
+  EXPECT_EQ(families, family_names());
+  EXPECT_EQ(berth_version(), std::to_string(BERTH_VERSION_MAJOR) + "." + std::to_string(BERTH_VERSION_MINOR) + "." +
+                                 std::to_string(BERTH_VERSION_PATCH));
+}
+
+TEST(CApi, TheLibraryShowsTheHeadersFunctionsAndNoMore) {
+  const std::string header = test::text_of(kRoot + "/include/berth.h");
+  std::set<std::string> declared;
+  const std::regex function("\n[a-z_0-9 ]+\\*? (berth_[a-z_]+)\\(");
+  for (std::sregex_iterator match(header.begin(), header.end(), function), end; match != end; ++match) {
+    declared.insert((*match)[1]);
+  }
+  const auto [text, status] = output_of("nm -D --defined-only --format=posix '" BERTH_C_LIBRARY "'");
+  ASSERT_EQ(status, 0);
+  std::set<std::string> exported;
+  const std::regex symbol("(\\S+) ([TDBWVu]) [^\n]*\n");
+  for (std::sregex_iterator match(text.begin(), text.end(), symbol), end; match != end; ++match) {
+    const std::string name = (*match)[1];
+    exported.insert(name.substr(0, name.find('@')));
+  }
+  EXPECT_GT(declared.size(), 30u);
+  EXPECT_EQ(exported, declared);
+}
+
+}  // namespace
+}  // namespace berth
