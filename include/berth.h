@@ -92,7 +92,7 @@ typedef struct berth_camera {
 
 /* Reads ROS camera_info YAML, a Kalibr camchain or a PhotonVision calibration. */
 berth_code berth_camera_read(berth_camera* camera, const char* path, berth_error* error);
-/* Table 2 of the paper for images of that size, to try things out. */
+/* Table 2 of the paper for 4:3 images of that size, to try things out. */
 berth_code berth_camera_paper(berth_camera* camera, int32_t width, int32_t height, berth_error* error);
 
 /* ---- Backends: devices that search frames ---- */
