@@ -14,8 +14,8 @@
 namespace berth::cli {
 namespace {
 
-// 0.2 s of a camera of 300 frames/s.
-constexpr std::size_t kFrameSlots = 64;
+// Most of a second of a camera of 300 frames/s: a thread on a busy machine may wait so long for its turn.
+constexpr std::size_t kFrameSlots = 256;
 constexpr std::size_t kImageSlots = 2;
 constexpr std::chrono::milliseconds kReportEvery(1000);
 constexpr int kJpegQuality = 80;
