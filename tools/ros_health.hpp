@@ -15,7 +15,7 @@ class RosHealth {
  public:
   /// What else a report tells.
   struct Beside {
-    /// Frames and images that found the publisher's queues full, messages that could not be sent.
+    /// Frames that found the queue full, and messages that could not be sent.
     std::uint64_t unpublished = 0, unsent = 0;
     /// Topics that readers ask more of than they offer: "pose (reliability)".
     std::string refused;
