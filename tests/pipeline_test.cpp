@@ -1,4 +1,4 @@
-// What a pipeline makes of frames is what a Detector makes of them, whatever its slots, threads, drops and losses.
+// What a pipeline makes of frames is what a Detector makes of them, whatever its slots, threads and drops.
 #include "berth/pipeline.hpp"
 
 #include <gmock/gmock.h>
@@ -6,106 +6,19 @@
 
 #include <atomic>
 #include <condition_variable>
-#include <map>
 #include <mutex>
-#include <stdexcept>
 #include <thread>
 
 #include "berth/error.hpp"
-#include "sim/corpus.hpp"
-#include "sim/render.hpp"
 #include "support/counted_allocations.hpp"
-#include "support/faulty_backend.hpp"
-#include "support/pictures.hpp"
+#include "support/pipeline_frames.hpp"
 
 namespace berth {
 namespace {
 
+using namespace test::pipeline;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
-
-constexpr int kWidth = 280;  // rows are padded
-constexpr int kHeight = 210;
-constexpr std::size_t kPictures = 6;
-
-const std::vector<GrayImage>& frames() {
-  static const std::vector<GrayImage> all = [] {
-    std::vector<GrayImage> images;
-    for (std::size_t i = 0; i + 1 < kPictures; ++i) {
-      images.push_back(sim::render(sim::corpus_scene("easy", static_cast<int>(i), kWidth, kHeight)));
-    }
-    images.push_back(pictures::mazes(kWidth, kHeight, 3));
-    return images;
-  }();
-  return all;
-}
-
-View2D<const u8> picture(u64 sequence) { return frames()[sequence % kPictures].view(); }
-
-DetectorConfig posing() {
-  DetectorConfig config;
-  config.camera = paper_camera(kWidth, kHeight);
-  config.marker_size_m = 0.1;
-  return config;
-}
-
-FrameStamp stamped(u64 sequence) {
-  FrameStamp stamp;
-  stamp.sequence = sequence;
-  return stamp;
-}
-
-/// What the plain detector makes of every picture.
-std::vector<FrameResult> expected(const DetectorConfig& config) {
-  const std::unique_ptr<Backend> backend = open_backend("simd");
-  Detector detector(*backend, kWidth, kHeight, config);
-  std::vector<FrameResult> results;
-  for (u64 i = 0; i < kPictures; ++i) results.push_back(detector.detect(picture(i)));
-  return results;
-}
-
-void expect_same(const FrameResult& found, const FrameResult& wanted) {
-  EXPECT_EQ(found.status, wanted.status);
-  EXPECT_EQ(found.quads, wanted.quads);
-  ASSERT_EQ(found.detections.size(), wanted.detections.size());
-  for (std::size_t i = 0; i < wanted.detections.size(); ++i) {
-    const Detection& a = found.detections[i];
-    const Detection& b = wanted.detections[i];
-    EXPECT_EQ(a.id, b.id);
-    EXPECT_EQ(a.corners, b.corners);
-    EXPECT_EQ(a.has_pose, b.has_pose);
-    EXPECT_EQ(a.pose.R, b.pose.R);
-    EXPECT_EQ(a.pose.t, b.pose.t);
-    ASSERT_EQ(a.pose_uncertainty.has_value(), b.pose_uncertainty.has_value());
-    if (b.pose_uncertainty) {
-      EXPECT_EQ(a.pose_uncertainty->covariance, b.pose_uncertainty->covariance);
-    }
-  }
-  ASSERT_EQ(found.digests.size(), wanted.digests.size());
-  for (std::size_t i = 0; i < wanted.digests.size(); ++i) {
-    EXPECT_EQ(found.digests[i].digest, wanted.digests[i].digest) << wanted.digests[i].stage;
-  }
-}
-
-/// Checks each frame that is delivered against the detector's result, and that none comes before an earlier one.
-class Judge {
- public:
-  explicit Judge(const DetectorConfig& config) : wanted_(expected(config)) {}
-  void operator()(const PipelineFrame& frame) {
-    const u64 sequence = frame.result->stamp.sequence;
-    EXPECT_TRUE(seen_ == 0 || sequence > last_) << sequence << " after " << last_;
-    SCOPED_TRACE(sequence);
-    expect_same(*frame.result, wanted_[sequence % kPictures]);
-    EXPECT_EQ(frame.image.at(kWidth - 1, 7), picture(sequence).at(kWidth - 1, 7));
-    last_ = sequence;
-    ++seen_;
-  }
-  u64 seen() const { return seen_; }
-
- private:
-  std::vector<FrameResult> wanted_;
-  u64 last_ = 0, seen_ = 0;
-};
 
 TEST(Pipeline, GivesTheDetectorsBitsOnEveryBackendWithAnySlots) {
   PipelineConfig config;
@@ -238,28 +151,6 @@ TEST(Pipeline, PixelsMayBeWrittenStraightIntoASlot) {
   EXPECT_EQ(judge.seen(), 30u);
 }
 
-TEST(Pipeline, WhatACallbackThrowsEndsItAndComesOutOfStop) {
-  const std::unique_ptr<Backend> backend = open_backend("simd");
-  PipelineConfig config;
-  config.overrun = Overrun::wait;
-  int calls = 0;
-  Pipeline pipeline({backend.get()}, kWidth, kHeight, config, [&](const PipelineFrame&) {
-    if (++calls == 3) throw std::runtime_error("the log is full");
-  });
-  pipeline.start();
-  u64 offered = 0;
-  while (pipeline.push(picture(offered), stamped(offered))) ++offered;
-  EXPECT_THAT([&] { pipeline.stop(); }, ThrowsMessage<std::runtime_error>(HasSubstr("the log is full")));
-  EXPECT_EQ(calls, 3);
-  const PipelineCounts counts = pipeline.counts();
-  EXPECT_EQ(counts.delivered + counts.all_dropped(), counts.offered);
-  calls = 3;
-  pipeline.start();
-  EXPECT_TRUE(pipeline.push(picture(0), stamped(0)));
-  pipeline.stop();
-  EXPECT_EQ(calls, 4);
-}
-
 TEST(Pipeline, ACallbackClosesItButCannotStopIt) {
   const std::unique_ptr<Backend> backend = open_backend("simd");
   PipelineConfig config;
@@ -329,132 +220,6 @@ TEST(Pipeline, SaysSoWhenAFrameWasNotTaken) {
     camera.join();
     EXPECT_EQ(pipeline.counts().offered, taken);
   }
-}
-
-/// A backend that throws where none should: in one replay, or in one wait for the device.
-struct Throws {
-  int in_replay = -1, in_finish = -1;
-  std::atomic<int> replays = 0, waits = 0;
-};
-
-class ThrowingStream final : public Stream {
- public:
-  ThrowingStream(std::unique_ptr<Stream> behind, Throws& throws) : behind_(std::move(behind)), throws_(throws) {}
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
-  void download(Buffer& buffer, void* data, std::size_t bytes) override { behind_->download(buffer, data, bytes); }
-  void replay(Plan& plan) override {
-    if (throws_.replays++ == throws_.in_replay) throw std::runtime_error("no replay");
-    behind_->replay(plan);
-  }
-  std::unique_ptr<Event> record_event() override { return behind_->record_event(); }
-  bool finish() override {
-    if (throws_.waits++ == throws_.in_finish) throw std::runtime_error("no wait");
-    return behind_->finish();
-  }
-
- private:
-  std::unique_ptr<Stream> behind_;
-  Throws& throws_;
-};
-
-class ThrowingBackend final : public Backend {
- public:
-  explicit ThrowingBackend(Throws& throws) : behind_(open_backend("simd")), throws_(throws) {}
-  const char* name() const override { return "throwing"; }
-  DeviceInfo device() const override { return behind_->device(); }
-  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_->make_buffer(bytes); }
-  std::unique_ptr<Stream> make_stream() override {
-    return std::make_unique<ThrowingStream>(behind_->make_stream(), throws_);
-  }
-  std::unique_ptr<Plan> record(const std::vector<Step>& steps) override { return behind_->record(steps); }
-
- private:
-  std::unique_ptr<Backend> behind_;
-  Throws& throws_;
-};
-
-TEST(Pipeline, WhatABackendThrowsEndsItAndComesOutOfStop) {
-  for (const bool on_host : {false, true}) {
-    for (const bool calls_back : {false, true}) {
-      SCOPED_TRACE(testing::Message() << (on_host ? "host" : "device") << (calls_back ? ", callback" : ", reader"));
-      Throws throws;
-      ThrowingBackend backend(throws);
-      PipelineConfig config;
-      config.overrun = Overrun::wait;
-      Pipeline::Deliver deliver;
-      if (calls_back) deliver = [](const PipelineFrame&) {};
-      Pipeline pipeline({&backend}, kWidth, kHeight, config, deliver);
-      pipeline.start();
-      (on_host ? throws.in_finish : throws.in_replay) = (on_host ? throws.waits : throws.replays) + 3;
-      std::thread camera([&] {
-        for (u64 i = 0; pipeline.push(picture(i), stamped(i));) ++i;
-      });
-      if (!calls_back) {
-        while (pipeline.next() != nullptr) continue;
-      }
-      camera.join();
-      EXPECT_THAT([&] { pipeline.stop(); },
-                  ThrowsMessage<std::runtime_error>(HasSubstr(on_host ? "no wait" : "no replay")));
-      PipelineCounts counts = pipeline.counts();
-      EXPECT_GE(counts.all_dropped(), 1u);
-      EXPECT_EQ(counts.delivered + counts.all_dropped(), counts.offered);
-      // It was that once only.
-      pipeline.start();
-      EXPECT_TRUE(pipeline.push(picture(0), stamped(0)));
-      if (!calls_back) {
-        EXPECT_NE(pipeline.next(), nullptr);
-      }
-      pipeline.stop();
-      counts = pipeline.counts();
-      EXPECT_EQ(counts.offered, 1u);
-      EXPECT_EQ(counts.delivered, 1u);
-    }
-  }
-}
-
-TEST(Pipeline, ALostDeviceCostsNoFrameWhereThereIsAnother) {
-  PipelineConfig config;
-  config.detector = posing();
-  config.overrun = Overrun::wait;
-  Judge judge(config.detector);
-  const std::unique_ptr<Backend> simd = open_backend("simd");
-  const std::unique_ptr<Backend> cpu = open_backend("cpu");
-  test::Fault fault;
-  fault.lose_frame = 3;
-  const std::unique_ptr<Backend> faulty = test::make_faulty_backend(*simd, fault);
-  std::map<std::size_t, int> by_backend;
-  Pipeline pipeline({faulty.get(), cpu.get()}, kWidth, kHeight, config, [&](const PipelineFrame& frame) {
-    ++by_backend[frame.backend];
-    judge(frame);
-  });
-  pipeline.start();
-  for (u64 i = 0; i < 40; ++i) pipeline.push(picture(i), stamped(i));
-  pipeline.stop();
-  EXPECT_EQ(judge.seen(), 40u);
-  EXPECT_GT(by_backend[0], 0);
-  EXPECT_GT(by_backend[1], 20);
-  EXPECT_GE(pipeline.counts().run_again, 1u);
-  EXPECT_LE(pipeline.counts().run_again, 3u);
-  EXPECT_EQ(pipeline.counts().device_lost, 0u);
-}
-
-TEST(Pipeline, SaysSoWhenTheLastDeviceIsLost) {
-  const std::unique_ptr<Backend> simd = open_backend("simd");
-  test::Fault fault;
-  fault.lose_frame = 2;
-  const std::unique_ptr<Backend> faulty = test::make_faulty_backend(*simd, fault);
-  PipelineConfig config;
-  config.overrun = Overrun::wait;
-  int lost = 0;
-  Pipeline pipeline({faulty.get()}, kWidth, kHeight, config, [&](const PipelineFrame& frame) {
-    lost += frame.result->status == FrameStatus::device_lost ? 1 : 0;
-  });
-  pipeline.start();
-  for (u64 i = 0; i < 30; ++i) pipeline.push(picture(i), stamped(i));
-  pipeline.stop();
-  EXPECT_GE(lost, 20);
-  EXPECT_EQ(pipeline.counts().device_lost, static_cast<u64>(lost));
-  EXPECT_EQ(pipeline.counts().delivered, 30u);
 }
 
 struct Load {

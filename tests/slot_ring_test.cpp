@@ -156,6 +156,31 @@ TEST(SlotRing, RunAgainComesBeforeTheOnesThatWaitAndKeepsItsPlace) {
   EXPECT_EQ(ring.await(), second);
 }
 
+TEST(SlotRing, TheDeviceWaitsForResultsThatItMayGoBy) {
+  SlotRing ring(5, Overrun::newest, 2);
+  const int first = put_on_device(ring);
+  put_on_device(ring);
+  offer(ring);
+  offer(ring);
+  EXPECT_EQ(dropped(ring, DropCause::device), 1u) << "two are in flight, slots or not";
+  EXPECT_EQ(ring.await(), first);
+  ring.on_host();
+  offer(ring);
+  EXPECT_EQ(dropped(ring, DropCause::host), 1u);
+  ring.settled();
+  const int third = take(ring);  // while the first is still being delivered
+  ring.on_device(third);
+  ring.delivering();
+  offer(ring);
+  offer(ring);
+  EXPECT_EQ(dropped(ring, DropCause::reader), 1u) << "the callback holds up the second's result";
+  ring.done(first, true);
+  EXPECT_NE(ring.await(), first);
+  ring.on_host();
+  offer(ring);
+  EXPECT_EQ(dropped(ring, DropCause::host), 2u) << "fetching the first would not help";
+}
+
 TEST(SlotRing, WhereNoFrameMayBeLostTheCameraWaits) {
   SlotRing ring(2, Overrun::wait);
   const int first = offer(ring);

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "berth/detector.hpp"
 #include "berth/latency.hpp"
+#include "berth/tracker.hpp"
 
 namespace berth {
 
@@ -21,6 +23,10 @@ enum class Overrun {
 
 struct PipelineConfig {
   DetectorConfig detector;
+  /// Markers that are held are searched in windows (docs/tracking.md); the detector's window_sides are then the
+  /// tracker's. A frame's windows go by the result TrackerConfig::behind frames before it, for which the device waits:
+  /// with 1 nothing overlaps but receiving, with 2 device and host do. At most slots − 1.
+  std::optional<TrackerConfig> tracking;
   /// Frames that there is memory for: one is filled or waits, the others are on the device, the host or with the
   /// reader. 2 or more; from 4 on receiving, device and host overlap in full.
   int slots = 4;
@@ -59,6 +65,8 @@ const char* name_of(DropCause cause);
 struct PipelineFrame {
   const FrameResult* result = nullptr;
   View2D<const u8> image;
+  /// How it was searched, where there is tracking; null otherwise.
+  const TrackedFrame* tracked = nullptr;
   /// The slot it was filled into: see FrameSlot.
   int slot = 0;
   /// Which of the pipeline's backends it was run on last.

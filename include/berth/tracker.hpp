@@ -37,6 +37,10 @@ struct TrackerConfig {
   /// A frame whose windows lack a marker is searched whole in the same call. False: the next one is, for deadlines
   /// that have no room for both.
   bool same_frame = true;
+  /// A frame's windows go by the result of the frame so many before it: 1 follows frame by frame. Where several are in
+  /// flight, as many as may be before a result is there: later results do not count even where they came in time, so
+  /// that the same frames have the same searches. More than 1 needs same_frame.
+  int behind = 1;
   /// How far a marker may be from where it is expected: px, and shares of its side and of how far it moved since the
   /// frame before; the first share again where that is not known yet.
   double slack_px = 4;
@@ -84,7 +88,9 @@ struct TrackerCounts {
 /// and times and by nothing else, so a recording replays to the same searches. Takes all its memory when it is made.
 ///
 /// look() runs a frame. What keeps several in flight has an order in each slot: next() fills it before the frame is
-/// submitted, take() reads it, in the frames' order, when the result is there.
+/// submitted, take() reads it, in the frames' order, when the result is there. The two may be called by two threads, as
+/// long as the result of the frame `TrackerConfig::behind` before has been taken, and the one thread knows it of the
+/// other, before a frame's next(); expect() belongs to next()'s thread and then needs `behind` 1.
 class Tracker {
  public:
   /// For frames of that size. Throws Error on a configuration out of bounds.
@@ -103,6 +109,8 @@ class Tracker {
     return frame();
   }
 
+  /// Gives an order the room it needs: next() and take() then allocate nothing.
+  static void reserve(SearchOrder& order);
   /// Where to search the frame of that time.
   void next(const FrameStamp& stamp, SearchOrder& order);
   /// Takes what the order's search found. False: it was not enough; the order now is to search the frame whole, and
@@ -115,7 +123,7 @@ class Tracker {
   /// Where a pose filter expects a marker at the next frame's time, in place of its corners' constant velocity; for a
   /// marker that is not held, nothing happens. `pose`: PoseFilter::foretell of that time, of a marker of `size_m`.
   void expect(const MarkerFamily& family, int id, const CameraModel& camera, double size_m, const FilteredPose& pose);
-  /// Holds nothing: the next frame is searched whole.
+  /// Holds nothing: the next frame is searched whole. What is in flight is forgotten, and not to be taken any more.
   void reset();
 
  private:

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <exception>
 #include <future>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -33,7 +34,7 @@ namespace {
 
 constexpr int kMostSlots = 1024;
 
-const PipelineConfig& checked(const PipelineConfig& config) {
+PipelineConfig checked(PipelineConfig config, int width, int height) {
   if (config.slots < 2 || config.slots > kMostSlots) {
     throw Error("a pipeline of " + std::to_string(config.slots) + " slots; give 2 to " + std::to_string(kMostSlots) +
                 ", usually 4");
@@ -48,6 +49,13 @@ const PipelineConfig& checked(const PipelineConfig& config) {
   for (const std::int64_t deadline : config.deadlines_ns) {
     if (deadline <= 0) throw Error("a deadline of " + std::to_string(deadline) + " ns; give more than 0");
   }
+  if (!config.tracking) return config;
+  if (config.tracking->behind >= config.slots) {
+    throw Error("windows by the result " + std::to_string(config.tracking->behind) +
+                " frames before, in a pipeline of " + std::to_string(config.slots) +
+                " slots; give fewer frames or more slots");
+  }
+  config.detector.window_sides = tracking_window_sides(width, height, *config.tracking);
   return config;
 }
 
@@ -58,6 +66,9 @@ struct Slot {
   /// False where enqueueing has thrown: there is nothing to wait for then.
   bool submitted = false;
   FrameResult result;
+  /// With a tracker: where it is to be searched, and where it was.
+  SearchOrder order;
+  TrackedFrame tracked;
   std::int64_t arrived_ns = 0, taken_ns = 0;
   PipelineFrame frame;
 
@@ -76,8 +87,11 @@ void count_one(std::atomic<u64>& counter) {
 
 struct Pipeline::Impl {
   Impl(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& wanted, Deliver callback)
-      : config(checked(wanted)), deliver(std::move(callback)), ring(config.slots, config.overrun) {
+      : config(checked(wanted, width, height)),
+        deliver(std::move(callback)),
+        ring(config.slots, config.overrun, config.tracking ? config.tracking->behind : 0) {
     if (backends.empty()) throw Error("a pipeline needs a backend; give at least one");
+    if (config.tracking) tracker.emplace(width, height, *config.tracking);
     slots.resize(static_cast<std::size_t>(config.slots));
     for (std::size_t i = 0; i < slots.size(); ++i) {
       Slot& slot = slots[i];
@@ -88,6 +102,11 @@ struct Pipeline::Impl {
       host->reserve(slot.device(), slot.result);
       slot.frame.result = &slot.result;
       slot.frame.slot = static_cast<int>(i);
+      if (!tracker) continue;
+      Tracker::reserve(slot.order);
+      slot.tracked.windows.reserve(slot.order.windows.capacity());
+      slot.tracked.result = &slot.result;
+      slot.frame.tracked = &slot.tracked;
     }
     ring.close();  // until start: a frame that nobody takes would stand in no count
   }
@@ -99,6 +118,7 @@ struct Pipeline::Impl {
   void start() {
     if (device_thread.joinable()) throw Error("the pipeline is running; stop it before it is started again");
     ring.reopen();
+    if (tracker) tracker->reset();
     error = nullptr;
     failed = false;
     for (LatencyHistogram& lap : laps) lap.clear();
@@ -163,7 +183,13 @@ struct Pipeline::Impl {
       slot.on = to;
     }
     if (!again) slot.taken_ns = monotonic_ns();
-    slot.device().submit();
+    DeviceFrame& device = slot.device();
+    if (tracker && !failed && !again) tracker->next(slot.result.stamp, slot.order);
+    if (slot.order.windows.empty()) {
+      device.submit();
+    } else {
+      device.submit_windows(device.image(), slot.order.windows);
+    }
   }
 
   void run_host(std::promise<void>& ready) {
@@ -186,20 +212,37 @@ struct Pipeline::Impl {
 
   void finish(int i) {
     Slot& slot = at(i);
-    const bool alive = wait_for_device(i);
-    if (!slot.submitted) return;
-    ring.on_host();
-    const std::int64_t began_ns = monotonic_ns();
-    if (alive) {
-      host->finish(slot.device(), slot.result);
-    } else {
-      HostFinish::give_up(slot.result);
-      count_one(device_lost);
+    std::int64_t began_ns = make_result(i);
+    if (tracker) {
+      // What was lost in its windows is searched whole before any later result is looked at.
+      while (slot.submitted && !failed && !tracker->take(slot.order, slot.result)) {
+        ring.run_again(i);
+        began_ns = make_result(i);
+      }
     }
+    if (!slot.submitted) return;
+    if (tracker && !failed) slot.tracked = tracker->frame();
+    ring.settled();
+    if (slot.result.status == FrameStatus::device_lost) count_one(device_lost);
     take_times(slot, began_ns);
     if (!deliver || failed) return;
     ring.delivering();
     deliver(slot.frame);
+  }
+
+  /// Waits for the frame and makes its result, unless enqueueing it has thrown. Returns when the host took it up.
+  std::int64_t make_result(int i) {
+    Slot& slot = at(i);
+    const bool alive = wait_for_device(i);
+    const std::int64_t began_ns = monotonic_ns();
+    if (!slot.submitted) return began_ns;
+    ring.on_host();
+    if (alive) {
+      host->finish(slot.device(), slot.result);
+    } else {
+      HostFinish::give_up(slot.result);
+    }
+    return began_ns;
   }
 
   /// Within a catch, on either thread: the first error is the one that stop throws. What is under way is dropped.
@@ -258,6 +301,8 @@ struct Pipeline::Impl {
   const Deliver deliver;
   std::vector<Slot> slots;
   std::unique_ptr<HostFinish> host;
+  /// The device's thread asks it for windows, the host's thread gives it results; the ring keeps them apart.
+  std::optional<Tracker> tracker;
   SlotRing ring;
   /// Which backend frames are run on; only the host's thread, which sees a loss, moves it.
   std::atomic<std::size_t> active = 0;
@@ -351,7 +396,8 @@ PipelineMemory Pipeline::memory() const {
     }
     memory.host_bytes += sizeof(Slot) + slot.result.detections.capacity() * sizeof(Detection) +
                          slot.result.bundles.capacity() * sizeof(BundlePose) +
-                         slot.result.disc_targets.capacity() * sizeof(DiscPose);
+                         slot.result.disc_targets.capacity() * sizeof(DiscPose) +
+                         3 * slot.order.windows.capacity() * sizeof(SearchWindow);
   }
   return memory;
 }

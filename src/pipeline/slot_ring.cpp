@@ -4,8 +4,14 @@
 
 namespace berth {
 
-SlotRing::SlotRing(int slots, Overrun overrun)
-    : slots_(slots), overrun_(overrun), free_(slots), waiting_(slots), on_device_(slots), unread_(slots) {
+SlotRing::SlotRing(int slots, Overrun overrun, int most_unsettled)
+    : slots_(slots),
+      most_unsettled_(most_unsettled),
+      overrun_(overrun),
+      free_(slots),
+      waiting_(slots),
+      on_device_(slots),
+      unread_(slots) {
   for (int slot = 0; slot < slots; ++slot) free_.push(slot);
 }
 
@@ -48,6 +54,7 @@ int SlotRing::take(bool& again) {
   if (!may_take()) return -1;
   ++taken_;
   ++under_way_;
+  ++unsettled_;
   enqueueing_ = true;
   return waiting_.pop();
 }
@@ -78,9 +85,23 @@ void SlotRing::run_again(int slot) {
   for_host_.wait(lock, [this] { return rerunning_ < 0; });
 }
 
+void SlotRing::settled() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  settle();
+}
+
+void SlotRing::settle() {
+  if (is_oldest_settled_) return;
+  is_oldest_settled_ = true;
+  --unsettled_;
+  for_device_.notify_one();
+}
+
 void SlotRing::done(int slot, bool for_reader) {
   const std::lock_guard<std::mutex> lock(mutex_);
   assert(on_device_.front() == slot);
+  settle();
+  is_oldest_settled_ = false;
   on_device_.pop();
   --under_way_;
   if (discarding_) {
@@ -150,8 +171,10 @@ PipelineCounts SlotRing::counts() const {
 }
 
 DropCause SlotRing::cause() const {
-  if (enqueueing_ || taken_ + 1 < slots_) return DropCause::device;
-  if (!unread_.empty() || reading_ >= 0 || oldest_ == Oldest::reader) return DropCause::reader;
+  if (enqueueing_ || (has_slot() && !awaits_results())) return DropCause::device;
+  // Where a result is awaited, fetching others would help nothing.
+  const bool is_unread = !has_slot() && (!unread_.empty() || reading_ >= 0);
+  if (is_unread || oldest_ == Oldest::reader) return DropCause::reader;
   return oldest_ == Oldest::host ? DropCause::host : DropCause::device;
 }
 

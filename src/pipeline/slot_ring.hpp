@@ -37,7 +37,8 @@ class SlotQueue {
 /// but one are past waiting, so that the newest frame always finds one. Every lock is held for a few moves of indices.
 class SlotRing {
  public:
-  SlotRing(int slots, Overrun overrun);
+  /// At most `most_unsettled` frames are past waiting whose result is not settled yet; 0 for no bound.
+  SlotRing(int slots, Overrun overrun, int most_unsettled = 0);
 
   /// The camera's thread. A slot to fill; −1 once the ring is closed. Asked again before commit it gives the same.
   int begin();
@@ -54,6 +55,8 @@ class SlotRing {
   int await();
   /// Has that frame run again by the device's thread, and waits until it is enqueued.
   void run_again(int slot);
+  /// Its result stands, and later frames may go by it. Where it is not said, done() says it.
+  void settled();
   /// It has arrived and is being finished; it is being delivered.
   void on_host() { set_oldest(Oldest::host); }
   void delivering() { set_oldest(Oldest::reader); }
@@ -77,21 +80,26 @@ class SlotRing {
   enum class Oldest { device, host, reader };
 
   bool at_end() const { return closed_ && waiting_.empty() && under_way_ == 0; }
-  bool may_take() const { return !waiting_.empty() && taken_ + 1 < slots_; }
+  bool has_slot() const { return taken_ + 1 < slots_; }
+  bool awaits_results() const { return most_unsettled_ > 0 && unsettled_ == most_unsettled_; }
+  bool may_take() const { return !waiting_.empty() && has_slot() && !awaits_results(); }
+  void settle();
   DropCause cause() const;
   void drop(int slot, DropCause cause);
   void set_oldest(Oldest oldest);
   void wake_all();
 
   const int slots_;
+  const int most_unsettled_;
   const Overrun overrun_;
   mutable std::mutex mutex_;
   std::condition_variable room_, for_device_, for_host_, for_reader_;
   SlotQueue free_, waiting_, on_device_, unread_;
   /// One at a time each: being filled; to be run again, and until it is enqueued; with the reader.
   int filling_ = -1, again_ = -1, rerunning_ = -1, reading_ = -1;
-  /// Slots past waiting; of these, those that the reader does not have yet.
-  int taken_ = 0, under_way_ = 0;
+  /// Slots past waiting; of these, those that the reader does not have yet; of these, those without a settled result.
+  int taken_ = 0, under_way_ = 0, unsettled_ = 0;
+  bool is_oldest_settled_ = false;
   /// Whether the device's thread is at work, and where the oldest frame under way is.
   bool enqueueing_ = false;
   Oldest oldest_ = Oldest::device;
