@@ -82,7 +82,8 @@ struct Searched {
 
 Searched searched(const TrackedFrame& tracked, const FrameResult& result) {
   Searched one{tracked.why, tracked.whole, {}, result.detections};
-  for (const SearchWindow& window : tracked.windows) one.windows.insert(one.windows.end(), {window.side, window.x, window.y});
+  for (const SearchWindow& window : tracked.windows)
+    one.windows.insert(one.windows.end(), {window.side, window.x, window.y});
   return one;
 }
 
@@ -167,7 +168,8 @@ TEST(PipelineTracking, MarkersHeldAreFoundInEveryFrameWithTheWholeFramesBits) {
       SCOPED_TRACE(i);
       const std::vector<Detection> all = whole.detect(picture(i)).detections;
       for (const Detection& d : found[i].found) {
-        EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const Detection& other) { return test::same_bits(d, other); }));
+        EXPECT_TRUE(
+            std::any_of(all.begin(), all.end(), [&](const Detection& other) { return test::same_bits(d, other); }));
         held = held || d.id == 4;
       }
       EXPECT_EQ(found[i].found.size(), i == 13 ? 0u : held ? 2u : 1u);
@@ -196,9 +198,8 @@ TEST(PipelineTracking, NothingIsAllocatedOnceStarted) {
   config.overrun = Overrun::wait;
   picture(0);  // drawn by now
   std::array<u64, kSearchReasons> why = {};
-  Pipeline pipeline({backend.get()}, kWidth, kHeight, config, [&](const PipelineFrame& frame) {
-    ++why[static_cast<std::size_t>(frame.tracked->why)];
-  });
+  Pipeline pipeline({backend.get()}, kWidth, kHeight, config,
+                    [&](const PipelineFrame& frame) { ++why[static_cast<std::size_t>(frame.tracked->why)]; });
   pipeline.start();
   const std::size_t started = test::allocations();
   constexpr u64 kPlayed = 20 * kFrames;

@@ -67,12 +67,13 @@ class Notes final : public FrameObserver {
   int begun = 0;
 };
 
-std::vector<Seen> observed(double fps, std::string& said) {
+std::vector<Seen> observed(double fps, std::string& said, bool track = false) {
   Pictures source(4);
   const auto notes = std::make_shared<Notes>();
   StreamOptions options;
   options.engine.backend = "simd";
   options.pace.fps = fps;
+  options.track = track;
   options.observers.push_back(notes);
   std::ostringstream out, err;
   Console console(out, err, false);
@@ -102,6 +103,15 @@ TEST(FrameObserver, SeesEachFrameOnceOnBothWays) {
     ranges += paced[i].ranges_m.size();
   }
   EXPECT_GT(ranges, 0u);
+}
+
+TEST(Stream, SaysHowFramesWereSearchedOnBothWays) {
+  for (const double fps : {0.0, 20.0}) {
+    std::string said;
+    const std::vector<Seen> seen = observed(fps, said, true);
+    ASSERT_FALSE(seen.empty());
+    EXPECT_THAT(said, testing::HasSubstr("whole: none_held"));
+  }
 }
 
 }  // namespace

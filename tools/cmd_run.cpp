@@ -41,6 +41,11 @@ void add_pace_options(CLI::App& command, PaceOptions& pace) {
   };
   paced(command.add_option("--minutes", pace.minutes, "play them round and round until then"), "M");
   paced(command.add_option("--slots", pace.slots, "frames under way at most, 2 or more")->capture_default_str(), "N");
+  paced(command
+            .add_option("--behind", pace.behind,
+                        "with --track: windows go by the result so many frames before; 1 lets nothing overlap")
+            ->capture_default_str(),
+        "N");
   paced(command.add_option("--cores", pace.cores, "the device's core and the host's, e.g. 0,1; or one for both")
             ->delimiter(','),
         "A,B");

@@ -48,7 +48,8 @@ double megabytes(std::size_t bytes) { return static_cast<double>(bytes) / 1e6; }
 
 }  // namespace
 
-PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig detector) {
+PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig detector,
+                                    std::optional<TrackerConfig> tracking) {
   if (!(options.fps > 0) || options.fps > 100000) {
     throw bad_option("--fps", std::to_string(options.fps), "give frames a second, above 0 and at most 100000");
   }
@@ -66,6 +67,13 @@ PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig d
   }
   config.detector = std::move(detector);
   config.slots = options.slots;
+  if (tracking) {
+    if (options.behind < 1 || options.behind >= options.slots) {
+      throw bad_option("--behind", std::to_string(options.behind), "give 1 or more frames, fewer than --slots");
+    }
+    tracking->behind = options.behind;
+    config.tracking = tracking;
+  }
   config.cores = options.cores;
   config.realtime_priority = options.realtime;
   return config;
@@ -95,12 +103,11 @@ std::vector<SourceFrame> read_to_play(Source& source, std::uint64_t most, Consol
 }
 
 PacedPlay::PacedPlay(std::vector<SourceFrame> frames, const PaceOptions& options, const std::vector<Backend*>& backends,
-                     DetectorConfig detector)
+                     const PipelineConfig& config)
     : frames_(std::move(frames)),
       options_(options),
       total_(frames_to_play(frames_.size(), options)),
-      pipeline_(backends, frames_.front().image.width(), frames_.front().image.height(),
-                make_pipeline_config(options, std::move(detector))),
+      pipeline_(backends, frames_.front().image.width(), frames_.front().image.height(), config),
       seen_(frames_.size()) {
   resident_kb_.reserve(static_cast<std::size_t>(options_.minutes * 60e9 / static_cast<double>(kSampleEveryNs)) + 16);
 }

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <thread>
@@ -22,6 +23,8 @@ struct PaceOptions {
   /// The frames go round until then; 0 for once through.
   double minutes = 0;
   int slots = 4;
+  /// With tracking: windows go by the result so many frames before (TrackerConfig::behind).
+  int behind = 2;
   std::vector<int> cores;
   /// SCHED_FIFO priority of camera, device and host, and one less of the reader; 0 for none.
   int realtime = 0;
@@ -29,7 +32,8 @@ struct PaceOptions {
 };
 
 /// Throws Error that names the field, its value and the remedy.
-PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig detector);
+PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig detector,
+                                    std::optional<TrackerConfig> tracking = {});
 
 /// The source's frames, `most` of them (0 for all), for a camera that plays them: of another size than the first one's
 /// they are complained about and passed over. Throws Error where they take more than 2 GB.
@@ -42,7 +46,7 @@ class PacedPlay {
  public:
   /// Frames of one size, one at least.
   PacedPlay(std::vector<SourceFrame> frames, const PaceOptions& options, const std::vector<Backend*>& backends,
-            DetectorConfig detector);
+            const PipelineConfig& config);
   ~PacedPlay();
   PacedPlay(const PacedPlay&) = delete;
   PacedPlay& operator=(const PacedPlay&) = delete;

@@ -6,29 +6,24 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <set>
 #include <string_view>
 
-#include "annotate.hpp"
 #include "berth/error.hpp"
 #include "bundle_show.hpp"
 #include "frame_json.hpp"
 #include "interrupt.hpp"
 #include "live_view.hpp"
 #include "marker_filters.hpp"
-#include "output_file.hpp"
 #include "result_digest.hpp"
 #include "source_arguments.hpp"
+#include "stream_summary.hpp"
 #include "systematic_show.hpp"
 #include "target_show.hpp"
-#include "trajectory_svg.hpp"
 #include "truth_score.hpp"
 
 namespace berth::cli {
 namespace {
-
-using MarkerKey = std::pair<std::string, int>;
 
 /// Results of a played camera from one that is shown to the next.
 constexpr std::uint64_t kShowEvery = 10;
@@ -42,7 +37,8 @@ class StreamRun {
         console_(console),
         people_(options.log == "-" ? console.err() : console.out()),
         view_(people_, options.log != "-" && console.out_is_terminal(), frames_expected()),
-        errors_(options.engine) {
+        errors_(options.engine),
+        summary_(options) {
     if (options.log.empty() || options.log == "-") return;
     log_.open(options.log, std::ios::binary);
     if (!log_) throw Error(options.log + ": the log cannot be written; check the folder and its permissions");
@@ -52,32 +48,32 @@ class StreamRun {
     const InterruptWatch interrupt;
     if (options_.pace.fps != 0) {
       play(interrupt);
-      return {frames_, frames_with_markers_, differing_};
+    } else {
+      while (options_.max_frames == 0 || summary_.frames() < options_.max_frames) {
+        const std::optional<SourceFrame> frame = next_readable(source_, console_, interrupt);
+        if (!frame) break;
+        handle(*frame);
+      }
+      view_.finish();
+      sum_up(interrupt.came());
     }
-    while (options_.max_frames == 0 || frames_ < options_.max_frames) {
-      const std::optional<SourceFrame> frame = next_readable(source_, console_, interrupt);
-      if (!frame) break;
-      handle(*frame);
-    }
-    view_.finish();
-    sum_up(interrupt.came());
-    return {frames_, frames_with_markers_, differing_};
+    return {summary_.frames(), summary_.with_markers(), summary_.differing()};
   }
 
  private:
   /// At a camera's pace, all frames read beforehand.
   void play(const InterruptWatch& interrupt) {
     // What is wrong shows before the frames are read.
-    make_pipeline_config(options_.pace, {});
+    make_pipeline_config(options_.pace, {}, tracking());
     if (!options_.engine.lockstep.empty()) throw Error("--lockstep compares every frame; leave --fps out");
-    if (options_.track) throw Error("--track follows markers frame by frame; leave --fps out");
     std::vector<SourceFrame> frames = read_to_play(source_, options_.max_frames, console_, interrupt);
     if (frames.empty()) throw Error("the source has no frame to play");
     const GrayImage& first = frames.front().image;
     make_engine(frames.front());
-    refuse_poses(frames.front());
+    refuse_poses(stream_frame(frames.front()));
     const DetectorConfig config = engine_->config_for(first.width(), first.height());
-    PacedPlay paced(std::move(frames), options_.pace, engine_->backends(), config);
+    PacedPlay paced(std::move(frames), options_.pace, engine_->backends(),
+                    make_pipeline_config(options_.pace, config, tracking()));
     paced.describe(people_);
     people_.flush();
     playing_ = &paced;
@@ -90,8 +86,10 @@ class StreamRun {
                       engine_->backends()[frame->backend]->name());
         backend = frame->backend;
       }
+      tracked_ = frame->tracked;
+      if (tracked_ != nullptr) summary_.add_search(*tracked_, 0);
       FrameResult result = *frame->result;
-      gather(source, result, 0, frame, paced.is_first_round(*frame));
+      gather(stream_frame(source), result, 0, frame, paced.is_first_round(*frame));
       if (interrupt.came()) paced.end();
     }
     playing_ = nullptr;
@@ -106,6 +104,13 @@ class StreamRun {
     const std::optional<std::size_t> total = source_.size();
     if (options_.max_frames == 0) return total;
     return std::min<std::size_t>(options_.max_frames, total.value_or(options_.max_frames));
+  }
+
+  std::optional<TrackerConfig> tracking() const {
+    if (!options_.track) return std::nullopt;
+    TrackerConfig tracking;
+    if (options_.full_every > 0) tracking.full_every = options_.full_every;
+    return tracking;
   }
 
   /// The engine is made for the first frame, since a simulated one tells families and sizes that were not given.
@@ -125,12 +130,7 @@ class StreamRun {
     if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
     if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    std::optional<TrackerConfig> tracking;
-    if (options_.track) {
-      tracking.emplace();
-      if (options_.full_every > 0) tracking->full_every = options_.full_every;
-    }
-    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking);
+    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking());
     const std::string backend = engine_->describe();
     people_ << "backend " << backend << '\n';
     const DetectorConfig sized = engine_->config_for(frame.image.width(), frame.image.height());
@@ -140,14 +140,14 @@ class StreamRun {
   }
 
   /// `digest`: of the result before its poses were scaled.
-  void tell_observers(const SourceFrame& frame, const FrameResult& result, u64 digest, const PipelineFrame* paced) {
+  void tell_observers(const StreamFrame& frame, const FrameResult& result, u64 digest, const PipelineFrame* paced) {
     if (options_.observers.empty()) return;
     const std::optional<CameraModel> camera = camera_of(frame);
     PipelineCounts counts;
     if (playing_ != nullptr) counts = playing_->counts();
     const Backend& backend = paced != nullptr ? *engine_->backends()[paced->backend] : engine_->backend();
     const ObservedFrame observed{frame.label,
-                                 frame.image.view(),
+                                 frame.image,
                                  result,
                                  digest,
                                  Mode::docking,
@@ -166,9 +166,10 @@ class StreamRun {
 
   void handle(const SourceFrame& frame) {
     if (!engine_) make_engine(frame);
-    refuse_poses(frame);
+    const StreamFrame shown = stream_frame(frame);
+    refuse_poses(shown);
     if (options_.filter && engine_->tracker() != nullptr) {
-      filters_.foretell(frame.stamp.mid_exposure_ns, camera_of(frame), *engine_->tracker());
+      filters_.foretell(frame.stamp.mid_exposure_ns, camera_of(shown), *engine_->tracker());
     }
     const Backend* before = &engine_->backend();
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
@@ -179,36 +180,33 @@ class StreamRun {
     }
     if (timed.difference) report_difference(frame.label, *timed.difference);
     tracked_ = timed.tracked;
-    if (tracked_ != nullptr) count_search(*tracked_, timed.cpu_ns);
     frame_ns_ = timed.wall_ns;
-    wall_ns_ += timed.wall_ns;
-    cpu_ns_ += timed.cpu_ns;
-    gather(frame, result, timed.cpu_ns, nullptr, true);
+    if (tracked_ != nullptr) summary_.add_search(*tracked_, timed.cpu_ns);
+    summary_.add_times(timed.wall_ns, timed.cpu_ns);
+    gather(shown, result, timed.cpu_ns, nullptr, true);
   }
 
   /// The camera file's, or what --camera-fit makes of it.
-  std::optional<CameraModel> camera_of(const SourceFrame& frame) const {
-    return engine_->camera_for(frame.image.width(), frame.image.height());
+  std::optional<CameraModel> camera_of(const StreamFrame& frame) const {
+    return engine_->camera_for(frame.image.width, frame.image.height);
   }
 
-  void refuse_poses(const SourceFrame& frame) {
-    const std::string refusal = engine_->pose_refusal(frame.image.width(), frame.image.height());
+  void refuse_poses(const StreamFrame& frame) {
+    const std::string refusal = engine_->pose_refusal(frame.image.width, frame.image.height);
     if (!refusal.empty() && !refused_) console_.complain(frame.label + ": " + refusal);
     refused_ = refused_ || !refusal.empty();
   }
 
   /// Takes a frame's result into everything that was asked for. `paced` where it came through a pipeline. Errors and
   /// ways are of the first round alone: what is played for hours must not fill the memory.
-  void gather(const SourceFrame& frame, FrameResult& result, std::int64_t cpu_ns, const PipelineFrame* paced,
+  void gather(const StreamFrame& frame, FrameResult& result, std::int64_t cpu_ns, const PipelineFrame* paced,
               bool first_round) {
     const u64 digest = options_.observers.empty() ? 0 : digest_of(result);
     scale_poses(result.detections, frame.truth);
     find_systematic(frame, result);
     if (options_.filter) filter(frame, result, first_round);
     tell_observers(frame, result, digest, paced);
-    ++frames_;
-    frames_with_markers_ += result.detections.empty() && !any_found(result.disc_targets) ? 0 : 1;
-    overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
+    summary_.add(frame, result, engine_->config(), first_round);
     if (!options_.log.empty()) {
       Json line = to_json(result, frame.label, cpu_ns, frame.truth);
       for (std::size_t i = 0; i < systematic_.size(); ++i) add_systematic(systematic_[i], line["detections"][i]);
@@ -222,20 +220,8 @@ class StreamRun {
       if (tracked_ != nullptr) line["search"] = to_json(*tracked_);
       log() << to_line(line) << '\n';
     }
-    if (!frame.truth.empty() && first_round) {
-      score_.add(frame.truth, result.detections);
-      score_bundles(result, frame.truth);
-      has_truth_ = true;
-    }
-    if (first_round) score_targets(result, frame.truth_targets);
-    if (!options_.svg.empty() && first_round) remember_ways(result.detections, frame.truth);
-    if (!options_.picture.empty() && !result.detections.empty() &&
-        result.detections.size() >= picture_detections_.size()) {
-      picture_ = frame.image;
-      picture_detections_ = result.detections;
-    }
     // A camera's reader has no time to write what nobody can read.
-    if (paced == nullptr || frames_ % kShowEvery == 0) show(result, frame.truth);
+    if (paced == nullptr || summary_.frames() % kShowEvery == 0) show(result, frame.truth);
     if (result.status == FrameStatus::device_lost) {
       throw Error(frame.label + ": the device was lost; see berth doctor, or use --backend simd");
     }
@@ -252,46 +238,28 @@ class StreamRun {
     }
   }
 
-  void filter(const SourceFrame& frame, const FrameResult& result, bool scored) {
+  void filter(const StreamFrame& frame, const FrameResult& result, bool scored) {
     if (std::string_view(result.stamp.clock) == "none") {
       throw Error(frame.label +
                   ": frames without times cannot be filtered; leave --filter out, or use a video or a live source");
     }
     filters_.update(result, engine_->config(), camera_of(frame), frame.truth);
-    if (!frame.truth.empty() && scored) filtered_score_.add(frame.truth, filters_.as_detections());
+    if (scored) summary_.add_filtered(frame, filters_.as_detections());
   }
 
-  void find_systematic(const SourceFrame& frame, const FrameResult& result) {
+  void find_systematic(const StreamFrame& frame, const FrameResult& result) {
     systematic_.clear();
     for (const Detection& d : result.detections) {
       const TruthMarker* marker = in_bundle(d) ? nullptr : truth_of(d, frame.truth);
       const double size_m = marker != nullptr ? marker->size_m : marker_size_m(engine_->config(), *d.family, d.id);
-      systematic_.push_back(errors_.of(*engine_, frame.image.width(), frame.image.height(), size_m, d));
-    }
-  }
-
-  void count_search(const TrackedFrame& tracked, std::int64_t cpu_ns) {
-    Searched& searched = searches_[static_cast<std::size_t>(tracked.why)];
-    ++searched.frames;
-    searched.cpu_ns += cpu_ns;
-  }
-
-  void print_searches() {
-    for (std::size_t i = 0; i < searches_.size(); ++i) {
-      const Searched& searched = searches_[i];
-      if (searched.frames == 0) continue;
-      const SearchReason why = static_cast<SearchReason>(i);
-      people_ << fmt::format(
-          "  {:<24} {} frame{}, {:.3f} ms of processor time each\n",
-          why == SearchReason::held ? std::string("in windows") : fmt::format("whole: {}", name_of(why)),
-          searched.frames, searched.frames == 1 ? "" : "s",
-          ms_of(searched.cpu_ns) / static_cast<double>(searched.frames));
+      systematic_.push_back(errors_.of(*engine_, frame.image.width, frame.image.height, size_m, d));
     }
   }
 
   void report_difference(const std::string& label, const StageDifference& difference) {
     // The first in full; a broken driver may differ in every frame to come.
-    if (++differing_ == 1) console_.note(label + ": the backends differ first in " + to_string(difference));
+    if (summary_.add_difference() == 1)
+      console_.note(label + ": the backends differ first in " + to_string(difference));
   }
 
   void scale_poses(std::vector<Detection>& detections, const std::vector<TruthMarker>& truth) const {
@@ -314,45 +282,11 @@ class StreamRun {
                        [&](const Bundle& bundle) { return bundle.find(*detection.family, detection.id) != nullptr; });
   }
 
-  void score_bundles(const FrameResult& result, const std::vector<TruthMarker>& truth) {
-    for (std::size_t i = 0; i < result.bundles.size(); ++i) {
-      const Bundle& bundle = engine_->config().bundles[i];
-      Pose true_pose;
-      if (!truth_of(bundle, truth, true_pose)) continue;
-      score_.add_body("bundle " + bundle.name, result.bundles[i].has_pose ? &result.bundles[i].pose : nullptr,
-                      true_pose);
-    }
-  }
-
-  void score_targets(const FrameResult& result, const std::vector<TruthTarget>& truth) {
-    for (std::size_t i = 0; i < result.disc_targets.size(); ++i) {
-      const DiscTarget& target = engine_->config().disc_targets[i];
-      const TruthTarget* known = truth_of(target, truth);
-      if (known == nullptr) continue;
-      const DiscPose& found = result.disc_targets[i];
-      score_.add_body("target " + target.name, found.has_pose ? &found.pose : nullptr, known->pose);
-      has_truth_ = true;
-    }
-  }
-
-  void remember_ways(const std::vector<Detection>& detections, const std::vector<TruthMarker>& truth) {
-    for (const TruthMarker& marker : truth) {
-      std::vector<Trajectory::Point>& way = ways_[{marker.family, marker.id}];
-      way.push_back({marker.pose, std::nullopt});
-    }
-    for (const Detection& detection : detections) {
-      if (!detection.has_pose) continue;
-      std::vector<Trajectory::Point>& way = ways_[{detection.family->name, detection.id}];
-      if (truth_of(detection, truth) == nullptr) way.emplace_back();
-      way.back().estimate = detection.pose;
-    }
-  }
-
   void show(const FrameResult& result, const std::vector<TruthMarker>& truth) {
     const std::size_t n = result.detections.size();
     std::string line =
-        fmt::format("{:4.0f} fps  {} marker{}", options_.pace.fps > 0 ? options_.pace.fps : frames_per_second(), n,
-                    n == 1 ? " " : "s");
+        fmt::format("{:4.0f} fps  {} marker{}",
+                    options_.pace.fps > 0 ? options_.pace.fps : summary_.frames_per_second(), n, n == 1 ? " " : "s");
     if (result.status == FrameStatus::overflow) line += ", overflow";
     std::vector<std::string> table;
     const Detection* largest = nullptr;
@@ -375,12 +309,7 @@ class StreamRun {
     for (std::size_t i = 0; i < result.disc_targets.size(); ++i) {
       table.push_back("  " + describe(engine_->config().disc_targets[i], result.disc_targets[i]));
     }
-    view_.show(frames_, line, table, brief);
-  }
-
-  /// Of the detection alone, by the wall clock; 0 before the first frame.
-  double frames_per_second() const {
-    return wall_ns_ > 0 ? static_cast<double>(frames_) * 1e9 / static_cast<double>(wall_ns_) : 0;
+    view_.show(summary_.frames(), line, table, brief);
   }
 
   static double area_of(const Detection& d) {
@@ -402,75 +331,22 @@ class StreamRun {
     return text;
   }
 
-  /// Nothing of files, nor of a camera that went through nothing.
-  void print_camera_health() {
-    const SourceHealth health = source_.health();
-    if (health.lost + health.incomplete + health.skipped + health.reopened == 0) return;
-    people_ << fmt::format(
-        "  camera: {} frames skipped for newer ones, {} lost before they came, {} incomplete; opened "
-        "again {} times\n",
-        health.skipped, health.lost, health.incomplete, health.reopened);
-  }
-
   void sum_up(bool by_interrupt, const PacedPlay* paced = nullptr) {
     if (by_interrupt) people_ << "interrupted\n";
-    people_ << fmt::format("{} frame{}, {} with markers", frames_, frames_ == 1 ? "" : "s", frames_with_markers_);
-    if (overflows_ > 0) people_ << fmt::format(", {} overflowed", overflows_);
-    if (!options_.engine.lockstep.empty()) people_ << fmt::format(", {} differing", differing_);
-    if (frames_ > 0 && paced == nullptr) {
-      const auto mean_ms = [&](std::int64_t ns) { return ms_of(ns) / static_cast<double>(frames_); };
-      people_ << fmt::format("; detection alone {:.3f} ms a frame ({:.0f} frames/s), {:.3f} ms of processor time",
-                             mean_ms(wall_ns_), frames_per_second(), mean_ms(cpu_ns_));
-    }
-    people_ << '\n';
+    summary_.print_counts(people_);
     if (paced != nullptr) {
       paced->sum_up(people_);
       if (!options_.log.empty()) log() << to_line(paced->summary()) << '\n';
     }
-    print_searches();
-    print_camera_health();
-    if (has_truth_) score_.print(people_);
-    if (has_truth_ && options_.filter) {
-      people_ << "filtered over time:\n";
-      filtered_score_.print(people_);
-    }
+    summary_.print_rest(people_, source_.health());
     if (!options_.log.empty() && options_.log != "-") {
       log_.close();
       if (!log_) throw Error(options_.log + ": writing the log failed; check the disk's space");
       people_ << "log         " << options_.log << '\n';
     }
-    if (!options_.svg.empty()) write_svg();
-    if (!options_.picture.empty() && !picture_detections_.empty()) {
-      write_annotated(options_.picture, picture_.view(), picture_detections_,
-                      engine_->camera_for(picture_.width(), picture_.height()));
-      people_ << "picture     " << options_.picture << '\n';
-    }
+    if (engine_) summary_.write_files(console_, people_, *engine_);
     for (const auto& observer : options_.observers) observer->finish(people_);
     people_.flush();
-  }
-
-  void write_svg() {
-    const std::pair<const MarkerKey, std::vector<Trajectory::Point>>* most = nullptr;
-    const auto found = [](const std::vector<Trajectory::Point>& way) {
-      return std::count_if(way.begin(), way.end(), [](const Trajectory::Point& p) { return p.estimate.has_value(); });
-    };
-    for (const auto& way : ways_) {
-      if (most == nullptr || found(way.second) > found(most->second)) most = &way;
-    }
-    if (most == nullptr || found(most->second) == 0) {
-      console_.note(options_.svg + ": not written, no marker had a pose");
-      return;
-    }
-    Trajectory trajectory;
-    trajectory.title = fmt::format("{} {} in the camera frame, {} of {} frames", most->first.first, most->first.second,
-                                   found(most->second), frames_);
-    const auto scored = score_.markers().find(most->first);
-    trajectory.size_m = scored != score_.markers().end()
-                            ? scored->second.size_m
-                            : marker_size_m(engine_->config(), family(most->first.first), most->first.second);
-    trajectory.points = most->second;
-    write_file(options_.svg, "the drawing", trajectory_svg(trajectory));
-    people_ << "trajectory  " << options_.svg << '\n';
   }
 
   Source& source_;
@@ -482,23 +358,12 @@ class StreamRun {
   std::optional<Engine> engine_;
   SystematicErrors errors_;
   std::vector<std::optional<std::array<double, 36>>> systematic_;  // of the frame's detections
-  bool size_given_ = false, refused_ = false, has_truth_ = false;
-  std::uint64_t frames_ = 0, frames_with_markers_ = 0, overflows_ = 0, differing_ = 0;
-  std::int64_t wall_ns_ = 0, cpu_ns_ = 0;
-  TruthScore score_, filtered_score_;
+  bool size_given_ = false, refused_ = false;
+  StreamSummary summary_;
   MarkerFilters filters_;
-  /// What frames that were searched for one reason came to.
-  struct Searched {
-    std::uint64_t frames = 0;
-    std::int64_t cpu_ns = 0;
-  };
-  std::array<Searched, kSearchReasons> searches_;
   const TrackedFrame* tracked_ = nullptr;  // of the frame at hand
   std::int64_t frame_ns_ = 0;              // its time by the wall clock
   const PacedPlay* playing_ = nullptr;     // while frames come through a pipeline
-  std::map<MarkerKey, std::vector<Trajectory::Point>> ways_;
-  GrayImage picture_;
-  std::vector<Detection> picture_detections_;
 };
 
 }  // namespace
