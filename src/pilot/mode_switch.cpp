@@ -27,7 +27,7 @@ const char* ModeSwitch::update(const Evidence& evidence) {
   }
   switch (mode_) {
     case Mode::docking:
-      if (marker_missing_ >= rules_.lost_frames) {
+      if (marker_missing_ >= marker_lost_frames_) {
         if (sighted_ > 0) return change(Mode::navigation, "the marker was not read any more");
         return change(Mode::search, "neither marker nor target is seen any more");
       }

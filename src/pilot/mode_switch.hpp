@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "berth/pilot.hpp"
@@ -18,7 +19,10 @@ class ModeSwitch {
     bool sighted = false, followed = false;
   };
 
-  explicit ModeSwitch(const HandOver& rules) : rules_(rules) {}
+  /// `frames_a_look`: from the frame that the network is given to the one at which it has its say, 0 for the
+  /// same: a marker that is lost is not given up before.
+  explicit ModeSwitch(const HandOver& rules, int frames_a_look = 0)
+      : rules_(rules), marker_lost_frames_(std::max(rules.lost_frames, frames_a_look + 1)) {}
 
   Mode mode() const { return mode_; }
   /// The reason for a change of mode, "" without one.
@@ -28,6 +32,7 @@ class ModeSwitch {
   const char* change(Mode mode, const char* reason);
 
   HandOver rules_;
+  int marker_lost_frames_;
   Mode mode_ = Mode::search;
   // Frames running.
   int marker_near_ = 0, marker_missing_ = 0, marker_far_ = 0, sighted_ = 0, unsighted_ = 0;

@@ -2,6 +2,9 @@
 
 #include <pthread.h>
 #include <sched.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <cstring>
 #include <string>
@@ -50,6 +53,12 @@ void make_realtime(int priority) {
 void make_ordinary() {
   const sched_param parameters = {};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &parameters);
+}
+
+void make_background() {
+  make_ordinary();
+  // Where the process stands back further already, there is nothing to do.
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 10);
 }
 
 void name_thread(const char* name) { pthread_setname_np(pthread_self(), name); }

@@ -11,6 +11,9 @@ void make_realtime(int priority);
 /// Gives the calling thread the usual scheduling back.
 void make_ordinary();
 
+/// Has the calling thread stand back where others want the processor (nice 10, of this thread alone).
+void make_background();
+
 /// What the calling thread is called in top and in debuggers: 15 characters.
 void name_thread(const char* name);
 
