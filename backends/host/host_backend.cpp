@@ -132,6 +132,7 @@ class HostStream final : public Stream {
     for (const Call& call : static_cast<HostPlan&>(plan).calls) run(call);
   }
   std::unique_ptr<Event> record_event() override { return std::make_unique<HostEvent>(); }
+  bool is_immediate() const override { return true; }
   bool finish() override { return true; }
   std::vector<std::int64_t> time_steps(Plan& plan) override {
     std::vector<std::int64_t> times;

@@ -48,13 +48,15 @@ class ClStream final : public Stream {
       note(api_.clEnqueueNDRangeKernel(queue_.get(), launch.kernel.get(), 1, nullptr, &launch.items, &kGroup, 0,
                                        nullptr, nullptr));
     }
-    note(api_.clFlush(queue_.get()));  // or a driver may keep it all to itself until someone waits
+    flush();  // or a driver may keep it all to itself until someone waits
   }
 
   std::unique_ptr<Event> record_event() override {
     Handle<cl_event> event = mark();
     return std::make_unique<ClEvent>(api_, std::move(event), lost_);
   }
+
+  void flush() override { note(api_.clFlush(queue_.get())); }
 
   bool finish() override {
     // clFinish alone would not tell whether what it waited for went well.

@@ -1,6 +1,6 @@
-// Copies are collected in a command buffer; a replay submits them and the plan at once, an event or finish() submits
-// what was collected since. So a frame is two submissions: upload and plan, then the downloads; one where the host
-// reaches the buffers itself. What a submission holds is a batch; batches end in the order they began.
+// Copies are collected in a command buffer; a replay submits them and the plan at once; flush(), an event or finish()
+// submits what was collected since. So a frame is two submissions: upload and plan, then the downloads; one where the
+// host reaches the buffers itself. What a submission holds is a batch; batches end in the order they began.
 #include "vulkan/stream.hpp"
 
 #include <array>
@@ -59,13 +59,17 @@ class VkStream final : public Stream {
 
   void replay(Plan& plan) override { submit(static_cast<VkPlan&>(plan).commands()); }
 
-  std::unique_ptr<Event> record_event() override {
+  void flush() override {
     if (copying_) submit(nullptr);
+  }
+
+  std::unique_ptr<Event> record_event() override {
+    flush();
     return std::make_unique<VkMark>(*this, submitted_);
   }
 
   bool finish() override {
-    if (copying_) submit(nullptr);
+    flush();
     return wait_for(submitted_);
   }
 
@@ -151,7 +155,7 @@ class VkStream final : public Stream {
   bool take(std::size_t bytes, std::size_t& at) {
     at = ring_.take(bytes);
     if (at != StagingRing::kNoRoom) return true;
-    if (copying_) submit(nullptr);
+    flush();
     while (at == StagingRing::kNoRoom && done_ < submitted_) {
       if (!retire_oldest()) return false;
       at = ring_.take(bytes);

@@ -53,6 +53,7 @@ class Queue final : public Stream {
     }
   }
   std::unique_ptr<Event> record_event() override { return std::make_unique<Done>(); }
+  bool is_immediate() const override { return true; }
   bool finish() override { return true; }
 
  private:

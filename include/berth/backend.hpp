@@ -67,6 +67,11 @@ class Stream {
   virtual void download(Buffer& buffer, void* data, std::size_t bytes) = 0;
   virtual void replay(Plan& plan) = 0;
   virtual std::unique_ptr<Event> record_event() = 0;
+  /// Has all that was enqueued begin without anybody waiting for it. Only streams that hold copies back need it.
+  virtual void flush() {}
+  /// Whether everything is done when the call that enqueues it returns: there is no device beside the host then. Where
+  /// there is one, the host may still reach its buffers (Buffer::host).
+  virtual bool is_immediate() const { return false; }
   /// Waits for everything enqueued. Returns false when the device was lost.
   virtual bool finish() = 0;
   /// Runs the plan once more with each step alone on the device, and waits: what each took, ns, in the order recorded.

@@ -55,6 +55,7 @@ class DeviceFrame {
  private:
   void make_windows(Backend& backend, const DetectorConfig& config);
   SearchArea& free_area(const SearchWindow& window);
+  void end_submit();
 
   SearchArea whole_;
   std::vector<std::unique_ptr<SearchArea>> windows_;

@@ -22,7 +22,7 @@ DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const Detector
   make_windows(backend, config);
   areas_.reserve(windows_.size() + 1);
   areas_.push_back(&whole_);
-  if (whole_.is_staged() && !warm_up()) {  // not in the first frame's time
+  if (!stream_->is_immediate() && !warm_up()) {  // not in the first frame's time
     throw Error(std::string(backend.name()) + ": " + backend.device().name +
                 " was lost on the first, empty frame; see berth doctor, or use another backend");
   }
@@ -57,7 +57,13 @@ void DeviceFrame::submit() {
   areas_.push_back(&whole_);
   submitted_ = image();
   whole_.enqueue(*stream_);
-  if (!whole_.is_staged()) done_ns_ = monotonic_ns();
+  end_submit();
+}
+
+/// Another frame's plan must not come before this one's downloads.
+void DeviceFrame::end_submit() {
+  stream_->flush();
+  if (stream_->is_immediate()) done_ns_ = monotonic_ns();
 }
 
 /// A plan for the window that the frame does not use yet.
@@ -92,12 +98,12 @@ void DeviceFrame::submit_windows(View2D<const u8> frame, const std::vector<Searc
   submitted_ = frame;
   levels_->measure(frame);
   for (SearchArea* area : areas_) area->enqueue_window(frame, *levels_, *stream_);
-  if (!whole_.is_staged()) done_ns_ = monotonic_ns();
+  end_submit();
 }
 
 bool DeviceFrame::finish() {
   const bool alive = stream_->finish();
-  if (whole_.is_staged()) done_ns_ = monotonic_ns();
+  if (!stream_->is_immediate()) done_ns_ = monotonic_ns();
   return alive;
 }
 

@@ -44,6 +44,8 @@ class FaultyStream final : public Stream {
   std::unique_ptr<Event> record_event() override {
     return std::make_unique<FaultyEvent>(behind_->record_event(), lost_);
   }
+  void flush() override { behind_->flush(); }
+  bool is_immediate() const override { return behind_->is_immediate(); }
   bool finish() override { return behind_->finish() && !lost_; }
 
  private:
