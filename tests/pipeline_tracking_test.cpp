@@ -8,6 +8,7 @@
 
 #include "berth/error.hpp"
 #include "berth/pipeline.hpp"
+#include "frame/detector_parts.hpp"
 #include "sim/render.hpp"
 #include "support/counted_allocations.hpp"
 #include "support/faulty_backend.hpp"
@@ -210,6 +211,55 @@ TEST(PipelineTracking, NothingIsAllocatedOnceStarted) {
   pipeline.stop();
   EXPECT_GE(why[static_cast<std::size_t>(SearchReason::held)], 200u);
   EXPECT_GE(why[static_cast<std::size_t>(SearchReason::lost)], 20u);
+}
+
+TEST(PipelineTracking, WindowsShareTheMemoryThatTheHostDoesNotRead) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  PipelineConfig config;
+  config.slots = 3;
+  config.tracking = tracking(2);
+  const auto of_a_slot = [&] { return Pipeline({backend.get()}, kWidth, kHeight, config).memory().device_bytes / 3; };
+  const std::size_t shared = of_a_slot();
+  config.detector.digests = true;  // every stage's output is read
+  const std::size_t apart = of_a_slot();
+  const std::size_t whole = Detector(*backend, kWidth, kHeight, {}).device_bytes();
+  EXPECT_GT(shared, whole);
+  EXPECT_LT(2 * (shared - whole), apart - whole);
+}
+
+/// Windows of all sides in one frame, with digests and without, on every backend: what is shared is nobody's loss.
+TEST(PipelineTracking, SharedMemoryChangesNoBit) {
+  const std::vector<SearchWindow> windows = {{160, 40, 48}, {96, 240, 64}, {128, 200, 200}, {96, 16, 240}};
+  DetectorConfig config = posing();
+  config.window_sides = {96, 96, 128, 160};
+  for (const BackendStatus& status : probe_backends()) {
+    if (status.devices.empty() || status.name == "reference") continue;
+    SCOPED_TRACE(status.name);
+    const std::unique_ptr<Backend> backend = open_backend(status.name);
+    DeviceFrame apart(*backend, kWidth, kHeight, config, true);
+    DeviceFrame shared(*backend, kWidth, kHeight, config, false);
+    EXPECT_LT(shared.device_bytes(), apart.device_bytes());
+    HostFinish host(kWidth, kHeight, config);
+    for (const u64 i : {5, 10, 14}) {
+      std::array<FrameResult, 2> results;
+      std::size_t at = 0;
+      for (DeviceFrame* frame : {&apart, &shared}) {
+        host.reserve(*frame, results[at]);
+        frame->submit_windows(picture(i), windows);
+        ASSERT_TRUE(frame->finish());
+        host.finish(*frame, results[at++]);
+      }
+      EXPECT_EQ(results[0].quads, results[1].quads);
+      EXPECT_GT(results[0].quads, 0);
+      for (std::size_t k = 0; k < results[0].capacities.size(); ++k) {
+        EXPECT_EQ(results[0].capacities[k].needed, results[1].capacities[k].needed) << k;
+      }
+      ASSERT_EQ(results[0].detections.size(), results[1].detections.size());
+      for (std::size_t k = 0; k < results[0].detections.size(); ++k) {
+        EXPECT_TRUE(test::same_bits(results[0].detections[k], results[1].detections[k]));
+      }
+    }
+  }
 }
 
 TEST(PipelineTracking, RefusesMoreInFlightThanItsSlots) {

@@ -14,8 +14,10 @@ namespace berth {
 /// backend have as many frames in flight. All memory is taken in the constructor.
 class DeviceFrame {
  public:
-  /// Runs an empty frame first where there is a driver, which may finish compiling only then. Throws Error as Detector.
-  DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config);
+  /// Runs an empty frame first where there is a driver, which may finish compiling only then. `keeps_stages`: what
+  /// every window's plan writes stays until its next frame, for digests and comparisons; else windows share all that
+  /// the host does not read. Throws Error as Detector.
+  DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages = true);
   DeviceFrame(const DeviceFrame&) = delete;
   DeviceFrame& operator=(const DeviceFrame&) = delete;
 
@@ -53,11 +55,12 @@ class DeviceFrame {
   std::size_t host_bytes() const;
 
  private:
-  void make_windows(Backend& backend, const DetectorConfig& config);
+  void make_windows(Backend& backend, const DetectorConfig& config, bool keeps_stages);
   SearchArea& free_area(const SearchWindow& window);
   void end_submit();
 
   SearchArea whole_;
+  std::optional<ScratchBuffers> scratch_;  // the windows'
   std::vector<std::unique_ptr<SearchArea>> windows_;
   std::optional<FrameLevels> levels_;  // where there are windows
   std::vector<SearchArea*> areas_;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <functional>
 #include <string>
 
 #include "berth/error.hpp"
@@ -17,9 +18,9 @@ std::size_t slots_of(const SearchArea& area) {
 
 }  // namespace
 
-DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config)
+DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages)
     : whole_(MarkerPlan(backend, width, height, config), !config.disc_targets.empty()), stream_(backend.make_stream()) {
-  make_windows(backend, config);
+  make_windows(backend, config, keeps_stages);
   areas_.reserve(windows_.size() + 1);
   areas_.push_back(&whole_);
   if (!stream_->is_immediate() && !warm_up()) {  // not in the first frame's time
@@ -28,17 +29,21 @@ DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const Detector
   }
 }
 
-void DeviceFrame::make_windows(Backend& backend, const DetectorConfig& config) {
+void DeviceFrame::make_windows(Backend& backend, const DetectorConfig& config, bool keeps_stages) {
   const MarkerGeometry& g = geometry();
   if (!config.window_sides.empty() && !config.disc_targets.empty()) {
     throw Error("windows show markers alone; targets of discs and rings are looked for in whole frames");
   }
-  for (const int side : config.window_sides) {
+  if (!keeps_stages) scratch_.emplace(backend);
+  std::vector<int> sides = config.window_sides;
+  std::sort(sides.begin(), sides.end(), std::greater<int>());  // the shared ones are made for the largest
+  for (const int side : sides) {
     if (side % 16 != 0 || side < 64 || side > std::min(g.width, g.height)) {
       throw Error("window side " + std::to_string(side) + " is none for " + std::to_string(g.width) + "x" +
                   std::to_string(g.height) + "; give a multiple of 16 from 64 to the image's lesser side");
     }
-    windows_.push_back(std::make_unique<SearchArea>(MarkerPlan::of_window(backend, side, config)));
+    windows_.push_back(
+        std::make_unique<SearchArea>(MarkerPlan::of_window(backend, side, config, scratch_ ? &*scratch_ : nullptr)));
     windows_.back()->place.side = side;
   }
   if (windows_.empty()) return;
@@ -126,7 +131,7 @@ std::size_t DeviceFrame::most_in_frame() const {
 }
 
 std::size_t DeviceFrame::device_bytes() const {
-  std::size_t bytes = whole_.plan.device_bytes();
+  std::size_t bytes = whole_.plan.device_bytes() + (scratch_ ? scratch_->device_bytes() : 0);
   for (const auto& window : windows_) bytes += window->plan.device_bytes();
   return bytes;
 }

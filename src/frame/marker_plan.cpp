@@ -93,14 +93,16 @@ MarkerGeometry::MarkerGeometry(int image_width, int image_height, const Capaciti
 }
 
 MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config)
-    : MarkerPlan(backend, width, height, config, false) {}
+    : MarkerPlan(backend, width, height, config, false, nullptr) {}
 
-MarkerPlan MarkerPlan::of_window(Backend& backend, int side, const DetectorConfig& config) {
-  return MarkerPlan(backend, side, side, window_config(side, config), true);
+MarkerPlan MarkerPlan::of_window(Backend& backend, int side, const DetectorConfig& config, ScratchBuffers* scratch) {
+  return MarkerPlan(backend, side, side, window_config(side, config), true, scratch);
 }
 
-MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config, bool is_window)
-    : backend_(backend), is_window_(is_window), buffers_(backend) {
+MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config, bool is_window,
+                       ScratchBuffers* scratch)
+    : backend_(backend), is_window_(is_window), buffers_(backend), scratch_(scratch) {
+  if (scratch_ != nullptr) scratch_->begin();
   const MarkerGeometry whole(width, height, config.capacities);
   const MarkerGeometry half((width + 1) / 2, (height + 1) / 2, config.capacities);
   searches_ = {
@@ -128,7 +130,7 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
     upload_at_start(backend_, *backend_.make_stream(), *buffer, packed.data(), packed.size() * 4);
   }
   const int words = static_cast<int>(g.frame_bytes() / 4);
-  Buffer* pixels = buffers_.make(g.frame_bytes() / 4);
+  Buffer* pixels = make_scratch(g.frame_bytes() / 4);
   steps_.push_back(make_step(flat_field_params{words}, {frame_, buffer, pixels}, words));
   stages_.push_back({"flat_field", 0, pixels, Stage::Length::whole});
   return pixels;
@@ -137,7 +139,7 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
 Buffer* MarkerPlan::add_halve(Buffer* pixels) {
   const MarkerGeometry& whole = searches_[0].geometry;
   const MarkerGeometry& half = searches_[1].geometry;
-  Buffer* half_pixels = buffers_.make(half.frame_bytes() / 4);
+  Buffer* half_pixels = make_scratch(half.frame_bytes() / 4);
   const halve_params params{whole.padded_width / 4, whole.padded_height, half.padded_width / 4, half.padded_height};
   steps_.push_back(make_step(params, {pixels, half_pixels}, params.half_row_words * params.half_rows));
   stages_.push_back({"halve", 1, half_pixels, Stage::Length::whole});
@@ -151,7 +153,7 @@ void MarkerPlan::add_stage(std::size_t index, const char* name, Buffer* buffer, 
 MarkerPlan::Tiles MarkerPlan::add_tiles(std::size_t index, Buffer* pixels, const normalize_params& normalize) {
   const MarkerGeometry& g = searches_[index].geometry;
   const int words = g.tile_rows * g.tile_row_words;
-  const Tiles tiles{buffers_.make(static_cast<std::size_t>(words)), buffers_.make(static_cast<std::size_t>(words)),
+  const Tiles tiles{make_scratch(static_cast<std::size_t>(words)), make_scratch(static_cast<std::size_t>(words)),
                     buffers_.make(4)};
   levels_[index] = tiles.levels;
   add_step(make_step(tile_extrema_params{g.tile_row_words, g.tile_rows}, {pixels, tiles.minima, tiles.maxima}, words));
@@ -176,13 +178,13 @@ void MarkerPlan::add_search(std::size_t index, int cut, Buffer* search_pixels, c
   const int base_at = g.word_groups * kGroupSize;
   const int height = g.height;
   const int row_words = g.bit_row_words;
-  Buffer* raw_bits = buffers_.make(static_cast<std::size_t>(g.bit_words));
-  Buffer* bits = buffers_.make(static_cast<std::size_t>(g.bit_words));
-  Buffer* offsets = buffers_.make(static_cast<std::size_t>(base_at + g.word_groups + 1));
-  Buffer* cracks = buffers_.make(static_cast<std::size_t>(g.max_run_ends));
-  Buffer* nodes = buffers_.make(static_cast<std::size_t>(g.max_run_ends));
-  Buffer* spans = buffers_.make(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
-  search.points = buffers_.make(static_cast<std::size_t>(g.max_points));
+  Buffer* raw_bits = make_scratch(static_cast<std::size_t>(g.bit_words));
+  Buffer* bits = make_scratch(static_cast<std::size_t>(g.bit_words));
+  Buffer* offsets = make_scratch(static_cast<std::size_t>(base_at + g.word_groups + 1));
+  Buffer* cracks = make_scratch(static_cast<std::size_t>(g.max_run_ends));
+  Buffer* nodes = make_scratch(static_cast<std::size_t>(g.max_run_ends));
+  Buffer* spans = make_scratch(static_cast<std::size_t>(g.totals_at + 2 * (g.run_groups + 1)));
+  search.points = make_scratch(static_cast<std::size_t>(g.max_points));
   search.contours = buffers_.make(CONTOUR_HEADER + contours * CONTOUR_WORDS);
   search.quads = buffers_.make(contours * QUAD_WORDS);
   search.edges = buffers_.make(contours * EDGE_WORDS);

@@ -9,6 +9,7 @@
 #include "berth/detector.hpp"
 #include "berth/image.hpp"
 #include "buffer_list.hpp"
+#include "scratch_buffers.hpp"
 
 namespace berth {
 
@@ -79,7 +80,10 @@ class MarkerPlan {
 
   /// The plan of a square window: levels() and, where there is a flat field, gains() come with each frame, and contours
   /// within kWindowMargin of its border are left out (docs/tracking.md).
-  static MarkerPlan of_window(Backend& backend, int side, const DetectorConfig& config);
+  /// `scratch`: what other windows' plans on the same stream may overwrite, for all between the frame and what the host
+  /// reads; its stages are then no longer there. Null: all buffers are its own.
+  static MarkerPlan of_window(Backend& backend, int side, const DetectorConfig& config,
+                              ScratchBuffers* scratch = nullptr);
 
   /// Of the whole image.
   const MarkerGeometry& geometry() const { return searches_.front().geometry; }
@@ -96,10 +100,14 @@ class MarkerPlan {
 
   /// Outputs in order of computation.
   const std::vector<Stage>& stages() const { return stages_; }
+  /// Without what it shares.
   std::size_t device_bytes() const { return buffers_.device_bytes(); }
 
  private:
-  MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config, bool is_window);
+  MarkerPlan(Backend& backend, int width, int height, const DetectorConfig& config, bool is_window,
+             ScratchBuffers* scratch);
+  /// What only the plan's own steps read.
+  Buffer* make_scratch(std::size_t words) { return scratch_ != nullptr ? scratch_->take(words) : buffers_.make(words); }
   Buffer* add_flat_field(const std::vector<float>& gains);
   Buffer* add_halve(Buffer* pixels);
   /// The tiles' extrema and the levels they give, for the search `index` and those after it on the same pixels.
@@ -119,6 +127,7 @@ class MarkerPlan {
   bool is_window_;
   std::vector<MarkerSearch> searches_;
   BufferList buffers_;
+  ScratchBuffers* scratch_;  // while it is made
   Buffer* frame_ = nullptr;
   Buffer* gains_ = nullptr;
   std::array<Buffer*, 2> levels_ = {};

@@ -96,7 +96,8 @@ struct Pipeline::Impl {
     for (std::size_t i = 0; i < slots.size(); ++i) {
       Slot& slot = slots[i];
       for (Backend* backend : backends) {
-        slot.devices.push_back(std::make_unique<DeviceFrame>(*backend, width, height, config.detector));
+        slot.devices.push_back(
+            std::make_unique<DeviceFrame>(*backend, width, height, config.detector, config.detector.digests));
       }
       if (i == 0) host = std::make_unique<HostFinish>(width, height, config.detector);
       host->reserve(slot.device(), slot.result);
