@@ -150,6 +150,47 @@ TEST(V4l2, TakesACameraThatGivesNothingWholeForLost) {
   EXPECT_GT(source->health().incomplete, 0U);
 }
 
+TEST(V4l2, WritesFramesWhereTheyAreWanted) {
+  FakeV4l2 camera;
+  camera.stride = 10;
+  const auto source = open_v4l2(options_of(), opener_of(camera));
+  EXPECT_EQ(source->width(), 4);
+  EXPECT_EQ(source->height(), 2);
+  std::vector<u8> bytes(20, 9);
+  bytes[3] = 44;
+  std::vector<u8> slot(32, 1);
+  const View2D<u8> image{slot.data(), 4, 2, 16};  // rows further apart than they are long
+  FakeFrame cut{std::vector<u8>(7), 0, 0};
+  camera.frames = {cut};
+  source->await();
+  EXPECT_FALSE(source->fetch(image));
+  camera.frames = {{bytes, 1, 5'000'000}};
+  const FrameStamp stamp = source->await();
+  EXPECT_TRUE(source->fetch(image));
+  EXPECT_EQ(image.at(3, 0), 44);
+  EXPECT_EQ(image.at(0, 1), 9);
+  EXPECT_EQ(slot[4], 1) << "nothing between the rows";
+  EXPECT_EQ(stamp.mid_exposure_ns, 5'000'000'000);
+  EXPECT_EQ(source->label_of(stamp), "/dev/video7#1");
+  EXPECT_EQ(source->health().incomplete, 1U);
+  camera.frames = {{bytes, 2, 0}};
+  source->await();
+  EXPECT_THAT(
+      [&] {
+        source->fetch({slot.data(), 2, 2, 2});
+      },
+      ThrowsMessage<Error>(AllOf(HasSubstr("4x2 now, not 2x2"), HasSubstr("width and height"))));
+  FakeFrame short_one{std::vector<u8>(7), 3, 0};
+  camera.endless = short_one;
+  const auto exhaust = [&] {
+    for (;;) {
+      source->await();
+      source->fetch(image);
+    }
+  };
+  EXPECT_THAT(exhaust, ThrowsMessage<Error>(HasSubstr("no whole frame for 20 ms")));
+}
+
 TEST(V4l2, OpensACameraAgainThatWentAway) {
   FakeV4l2 camera;
   const auto source = open_v4l2(options_of(), opener_of(camera));

@@ -16,12 +16,27 @@ std::unique_ptr<Source> open_images(std::vector<std::string> paths);
 /// Throws Error when it cannot be opened.
 std::unique_ptr<Source> open_video(const std::string& path);
 
+/// A camera whose frames are written where they are wanted: nothing is allocated from frame to frame.
+class CameraSource : public Source {
+ public:
+  /// Of its frames; another size once it was opened again is an error of fetch().
+  virtual int width() const = 0;
+  virtual int height() const = 0;
+  /// Waits for the newest frame that is whole as far as the camera says, and gives its stamp. Throws Error as next()
+  /// does.
+  virtual FrameStamp await() = 0;
+  /// Writes the frame awaited, once. False where it turns out to be incomplete, which is counted.
+  virtual bool fetch(View2D<u8> image) = 0;
+  /// What its frames are called.
+  virtual std::string label_of(const FrameStamp& stamp) const = 0;
+};
+
 /// A camera of Video4Linux, newest frame first: what it took while a frame was being looked at is skipped and counted.
 /// A camera that gives no frame for V4l2Options::watchdog_ms, or is gone, is complained of (Error) and opened again by
 /// its name, at most every 2 s; frames go on when it is back. Times are the driver's, clock "monotonic". The middle of
 /// the exposure is known where exposure_us is set, else it is taken for the driver's time.
 /// Throws Error when it cannot be opened the first time.
-std::unique_ptr<Source> open_v4l2(const V4l2Options& options, V4l2Opener opener = open_v4l2_device);
+std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener opener = open_v4l2_device);
 
 /// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `v4l2:CAMERA`. A bare path is
 /// told by what it is: a folder, a name ending in .toml, an image name, otherwise a video. Throws Error that lists what

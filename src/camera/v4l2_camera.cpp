@@ -207,21 +207,24 @@ int V4l2Camera::give_back(const Filled& filled) {
   return device_->control(VIDIOC_QBUF, &buffer);
 }
 
-bool V4l2Camera::read(const Filled& filled, GrayImage& image) const {
+bool V4l2Camera::read(const Filled& filled, View2D<u8> image) const {
   const u8* data = buffers_[filled.index];
   if (fourcc_ == V4L2_PIX_FMT_MJPEG) {
     try {
-      image = decode_jpeg({data, data + filled.bytes}, options_.path);
+      const GrayImage decoded = decode_jpeg({data, data + filled.bytes}, options_.path);
+      if (decoded.width() != width_ || decoded.height() != height_) return false;
+      for (int y = 0; y < height_; ++y) {
+        std::memcpy(image.row(y), decoded.view().row(y), static_cast<std::size_t>(width_));
+      }
     } catch (const Error&) {
       return false;
     }
-    return image.width() == width_ && image.height() == height_;
+    return true;
   }
   const auto* format = std::find_if(std::begin(kFormats), std::end(kFormats),
                                     [&](const Format& candidate) { return candidate.fourcc == fourcc_; });
-  image = GrayImage(width_, height_);
   const std::size_t stride = stride_ > 0 ? stride_ : row_bytes(format->layout, width_);
-  return to_gray(data, filled.bytes, stride, format->layout, image.view());
+  return to_gray(data, filled.bytes, stride, format->layout, image);
 }
 
 }  // namespace berth

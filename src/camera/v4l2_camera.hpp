@@ -56,8 +56,9 @@ class V4l2Camera {
   int take(int timeout_ms, Filled& filled);
   /// Back to the driver.
   int give_back(const Filled& filled);
-  /// The image in that buffer as 8-bit gray. False where it is incomplete.
-  bool read(const Filled& filled, GrayImage& image) const;
+  /// Writes the image in that buffer as 8-bit gray, width() x height(). False where it is incomplete. Allocates where
+  /// the camera compresses (MJPG).
+  bool read(const Filled& filled, View2D<u8> image) const;
 
   int width() const { return width_; }
   int height() const { return height_; }

@@ -2,6 +2,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <optional>
 #include <thread>
 
 #include "berth/error.hpp"
@@ -16,33 +17,61 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kFirstPause{50}, kLongestPause{2000};
 
-class V4l2Source final : public Source {
+class V4l2Source final : public CameraSource {
  public:
   V4l2Source(V4l2Options options, V4l2Opener opener) : options_(std::move(options)), opener_(std::move(opener)) {
     open();
   }
 
   std::optional<SourceFrame> next() override {
+    SourceFrame frame;
+    do {
+      frame.stamp = await();
+      frame.image = GrayImage(width_, height_);
+    } while (!fetch(frame.image.view()));
+    frame.label = label_of(frame.stamp);
+    return frame;
+  }
+
+  int width() const override { return width_; }
+  int height() const override { return height_; }
+  FrameStamp await() override {
     if (!camera_) reopen();
     const Clock::time_point deadline = Clock::now() + milliseconds(options_.watchdog_ms);
     for (;;) {
-      V4l2Camera::Filled newest;
-      const int error = take_newest(newest, deadline);
+      const int error = take_newest(awaited_, deadline);
       if (error != 0 && error != ETIMEDOUT) lose(std::strerror(error));
+      if (error == 0 && !awaited_.damaged) return stamp(awaited_);
       if (error == 0) {
-        SourceFrame frame;
-        const bool whole = !newest.damaged && camera_->read(newest, frame.image);
-        stamp(newest, frame);
-        if (const int refused = camera_->give_back(newest)) lose(std::strerror(refused));
-        if (whole) {
-          pause_ = kFirstPause;
-          return frame;
-        }
+        if (const int refused = camera_->give_back(awaited_)) lose(std::strerror(refused));
         ++health_.incomplete;
       }
       // A camera whose frames are all damaged is of no more use than one that gives none.
-      if (Clock::now() >= deadline) lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms");
+      if (Clock::now() >= deadline) lose_for_silence();
     }
+  }
+
+  bool fetch(View2D<u8> image) override {
+    if (image.width != width_ || image.height != height_) {
+      lose("its images are " + std::to_string(width_) + "x" + std::to_string(height_) + " now, not " +
+           std::to_string(image.width) + "x" + std::to_string(image.height) + "; say which by width and height");
+    }
+    const bool is_whole = camera_->read(awaited_, image);
+    if (const int refused = camera_->give_back(awaited_)) lose(std::strerror(refused));
+    if (is_whole) {
+      pause_ = kFirstPause;
+      incomplete_since_.reset();
+      return true;
+    }
+    ++health_.incomplete;
+    const Clock::time_point now = Clock::now();
+    if (!incomplete_since_) incomplete_since_ = now;
+    if (now - *incomplete_since_ >= milliseconds(options_.watchdog_ms)) lose_for_silence();
+    return false;
+  }
+
+  std::string label_of(const FrameStamp& stamp) const override {
+    return options_.path + "#" + std::to_string(stamp.sequence);
   }
 
   SourceHealth health() const override { return health_; }
@@ -50,6 +79,8 @@ class V4l2Source final : public Source {
  private:
   void open() {
     camera_ = std::make_unique<V4l2Camera>(opener_(options_.path), options_);
+    width_ = camera_->width();
+    height_ = camera_->height();
     has_sequence_ = false;
   }
 
@@ -60,8 +91,11 @@ class V4l2Source final : public Source {
     ++health_.reopened;
   }
 
+  [[noreturn]] void lose_for_silence() { lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms"); }
+
   [[noreturn]] void lose(const std::string& why) {
     camera_.reset();
+    incomplete_since_.reset();
     throw Error(options_.path + ": the camera is lost (" + why + "); it is opened again as soon as it is back");
   }
 
@@ -92,20 +126,23 @@ class V4l2Source final : public Source {
     has_sequence_ = true;
   }
 
-  void stamp(const V4l2Camera::Filled& filled, SourceFrame& frame) {
+  FrameStamp stamp(const V4l2Camera::Filled& filled) {
     const std::int64_t exposure_ns = camera_->exposure_ns();
-    FrameStamp& stamp = frame.stamp;
+    FrameStamp stamp;
     stamp.sequence = sequence_++;
     stamp.exposure_start_ns = filled.from_start ? filled.time_ns : filled.time_ns - exposure_ns;
     stamp.mid_exposure_ns = stamp.exposure_start_ns + exposure_ns / 2;
     stamp.arrival_ns = monotonic_ns();
     stamp.clock = filled.monotonic ? "monotonic" : "driver";
-    frame.label = options_.path + "#" + std::to_string(stamp.sequence);
+    return stamp;
   }
 
   V4l2Options options_;
   V4l2Opener opener_;
   std::unique_ptr<V4l2Camera> camera_;
+  int width_ = 0, height_ = 0;
+  V4l2Camera::Filled awaited_;
+  std::optional<Clock::time_point> incomplete_since_;
   SourceHealth health_;
   milliseconds pause_ = kFirstPause;
   u64 sequence_ = 0;
@@ -115,7 +152,7 @@ class V4l2Source final : public Source {
 
 }  // namespace
 
-std::unique_ptr<Source> open_v4l2(const V4l2Options& options, V4l2Opener opener) {
+std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener opener) {
   return std::make_unique<V4l2Source>(options, std::move(opener));
 }
 

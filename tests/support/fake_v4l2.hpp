@@ -31,6 +31,7 @@ struct FakeV4l2 {
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   std::vector<std::uint32_t> formats = {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_GREY};
   std::uint32_t width = 4, height = 2, stride = 0;
+  std::uint32_t buffer_bytes = 64;
   /// The size and rate it goes by, whatever it is asked; 0: what it is asked.
   std::uint32_t only_width = 0, only_rate = 0;
   std::map<std::uint32_t, int> controls = {{V4L2_CID_EXPOSURE_AUTO, 3}, {V4L2_CID_EXPOSURE_ABSOLUTE, 156}};
@@ -88,7 +89,7 @@ class FakeV4l2Device final : public V4l2Device {
         return 0;
       case VIDIOC_QUERYBUF: {
         auto& buffer = *static_cast<v4l2_buffer*>(argument);
-        buffer.length = 64;
+        buffer.length = camera_.buffer_bytes;
         buffer.m.offset = buffer.index * 4096;
         return 0;
       }
@@ -112,8 +113,7 @@ class FakeV4l2Device final : public V4l2Device {
 
   int wait(int) override {
     if (!camera_.streaming) return EINVAL;
-    if (camera_.frames.empty() && camera_.endless) camera_.frames.push_back(*camera_.endless);
-    return camera_.frames.empty() || queued_.empty() ? camera_.when_empty : 0;
+    return !has_frame() || queued_.empty() ? camera_.when_empty : 0;
   }
 
  private:
@@ -131,24 +131,31 @@ class FakeV4l2Device final : public V4l2Device {
     tell_format(format);
   }
   int give(v4l2_buffer& buffer) {
-    if (camera_.frames.empty() || queued_.empty()) return EAGAIN;
-    const FakeFrame frame = camera_.frames.front();
-    camera_.frames.pop_front();
+    if (!has_frame() || queued_.empty()) return EAGAIN;
+    if (camera_.frames.empty()) {
+      hand_over(*camera_.endless, buffer);
+    } else {
+      hand_over(camera_.frames.front(), buffer);
+      camera_.frames.pop_front();
+    }
+    return 0;
+  }
+  bool has_frame() const { return !camera_.frames.empty() || camera_.endless; }
+  void hand_over(const FakeFrame& frame, v4l2_buffer& buffer) {
     buffer.index = queued_.front();
-    queued_.pop_front();
-    buffer.length = 64;
+    queued_.erase(queued_.begin());
+    buffer.length = camera_.buffer_bytes;
     buffer.bytesused = static_cast<std::uint32_t>(frame.bytes.size());
     buffer.sequence = frame.sequence;
     buffer.flags = frame.flags;
     buffer.timestamp = {frame.time_us / 1'000'000, frame.time_us % 1'000'000};
     std::memcpy(memory_[buffer.index].data(), frame.bytes.data(), frame.bytes.size());
     camera_.most_held = std::max(camera_.most_held, static_cast<int>(memory_.size() - queued_.size()));
-    return 0;
   }
 
   FakeV4l2& camera_;
   std::vector<std::vector<u8>> memory_;
-  std::deque<std::uint32_t> queued_;
+  std::vector<std::uint32_t> queued_;  // the oldest first
 };
 
 inline V4l2Opener opener_of(FakeV4l2& camera) {
