@@ -65,8 +65,8 @@ PilotStreamConfig config_for(Overrun overrun) {
 std::string line_of(const PilotFrame& frame, bool is_looked_at) {
   std::string line = std::to_string(frame.stamp.sequence) + " " + name_of(frame.mode) + " " + frame.change;
   if (frame.looked_for_target) {
-    line += "; of " + std::to_string(frame.sighting->stamp.sequence) + ": " + std::to_string(frame.sighting->score_q15) +
-            (frame.sighting->tracked ? " tracked" : "");
+    line += "; of " + std::to_string(frame.sighting->stamp.sequence) + ": " +
+            std::to_string(frame.sighting->score_q15) + (frame.sighting->tracked ? " tracked" : "");
   }
   if (is_looked_at) line += "; looked at";
   if (frame.has_position) {

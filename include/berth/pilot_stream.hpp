@@ -37,7 +37,7 @@ struct PilotStreamFrame {
 struct PilotStreamCounts {
   /// The network's, of these those whose word came late, and those in which its device was lost: it is not asked again.
   u64 looks = 0, late_looks = 0, lost_looks = 0;
-  /// Frames delivered while the network was at work and while it was not, and of these those later than each deadline
+  /// Frames on whose way the network was at work for a while, and the others; of these those later than each deadline
   /// of the pipeline.
   struct Beside {
     u64 frames = 0;

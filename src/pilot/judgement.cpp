@@ -99,9 +99,9 @@ void Judgement::locate() {
     }
     frame_.has_position = frame_.from_marker = true;
     const auto image_point = image_of(camera, frame_.position_m);
-    expectation_ = Expectation{
-        image_point[0], image_point[1],
-        (camera.fx + camera.fy) / 2 * config_.navigator.target_diameter_m / frame_.position_m[2]};
+    expectation_ =
+        Expectation{image_point[0], image_point[1],
+                    (camera.fx + camera.fy) / 2 * config_.navigator.target_diameter_m / frame_.position_m[2]};
     return;
   }
   const bool sighted = frame_.looked_for_target && frame_.sighting->status == FrameStatus::ok;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "berth/error.hpp"
+#include "monotonic.hpp"
 #include "pipeline/thread_setup.hpp"
 
 namespace berth {
@@ -78,6 +79,7 @@ void NetworkThread::work() {
 void NetworkThread::set(State state) {
   const std::lock_guard<std::mutex> lock(mutex_);
   state_ = state;
+  if (state == State::done) done_ns_ = monotonic_ns();
   changed_.notify_all();
 }
 
@@ -86,9 +88,9 @@ bool NetworkThread::is_free() const {
   return state_ == State::free;
 }
 
-bool NetworkThread::is_at_work() const {
+bool NetworkThread::was_at_work_since(std::int64_t ns) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return state_ == State::given;
+  return state_ == State::given || done_ns_ >= ns;
 }
 
 void NetworkThread::give(View2D<const u8> image, const FrameStamp& stamp, const std::optional<Expectation>& expected) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -22,12 +23,14 @@ class NetworkThread {
 
   /// Starts the thread, with nothing known of earlier frames. Throws Error where the device is lost.
   void start();
+  bool is_started() const { return thread_.joinable(); }
   /// Waits for a look under way, and forgets it.
   void stop();
 
   /// Whether it can be given a frame: the word on the one before was taken.
   bool is_free() const;
-  bool is_at_work() const;
+  /// Whether it is at work, or was at any time since; ns, monotonic.
+  bool was_at_work_since(std::int64_t ns) const;
   /// Copies the image.
   void give(View2D<const u8> image, const FrameStamp& stamp, const std::optional<Expectation>& expected);
   /// Takes the word on the frame that was given, if it is there, or waiting for it. Throws what the look has thrown.
@@ -49,6 +52,7 @@ class NetworkThread {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   State state_ = State::free;
+  std::int64_t done_ns_ = 0;
   bool ending_ = false;
   std::thread thread_;
 };

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "berth/error.hpp"
+#include "monotonic.hpp"
 #include "pilot/judgement.hpp"
 #include "pilot/network_thread.hpp"
 
@@ -33,6 +34,7 @@ struct PilotStream::Impl {
   }
 
   void start() {
+    if (network.is_started()) throw Error("the pilot's stream is running; stop it before it is started again");
     judgement.emplace(config.pilot, config.network_frames);
     frames = 0;
     given_at.reset();
@@ -91,7 +93,11 @@ struct PilotStream::Impl {
   }
 
   void count_deadlines(const PipelineFrame& frame) {
-    Beside& counts = network.is_at_work() ? beside_network : alone;
+    std::int64_t under_way_ns = 0;
+    for (const Lap lap : {Lap::wait, Lap::device, Lap::queue, Lap::decode, Lap::corners, Lap::pose}) {
+      under_way_ns += frame.laps_ns[static_cast<std::size_t>(lap)];
+    }
+    Beside& counts = network.was_at_work_since(monotonic_ns() - under_way_ns) ? beside_network : alone;
     ++counts.frames;
     for (std::size_t i = 0; i < counts.late.size(); ++i) {
       if (frame.laps_ns[static_cast<std::size_t>(Lap::latency)] > config.pipeline.deadlines_ns[i]) ++counts.late[i];
