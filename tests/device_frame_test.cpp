@@ -47,9 +47,7 @@ class LazyBackend final : public Backend {
   const char* name() const override { return "lazy"; }
   DeviceInfo device() const override { return behind_->device(); }
   std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_->make_buffer(bytes); }
-  std::unique_ptr<Stream> make_stream() override {
-    return std::make_unique<LazyStream>(behind_->make_stream(), lazy_);
-  }
+  std::unique_ptr<Stream> make_stream() override { return std::make_unique<LazyStream>(behind_->make_stream(), lazy_); }
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override { return behind_->record(steps); }
 
  private:

@@ -226,6 +226,26 @@ TEST(CliFlight, NavigatesByTheNetworkThatComesWithBerth) {
   EXPECT_LT(log[0]["network"]["off"].get<double>(), 0.2);
 }
 
+TEST(CliFlight, IsPlayedInRealTimeWithTheNetworkBeside) {
+  const test::ScratchFolder folder;
+  const test::CommandRun run = test::run_berth({"flight", "--network", kTiny, "--seed", "3", "--frames", "9", "--fps",
+                                                "10", "--deadline", "9000", "--nav-backend", "cpu", "--nav-frames", "2",
+                                                "--out", folder / "one", "--backend", "simd"});
+  EXPECT_THAT(run.out, HasSubstr("network     on cpu, its word counts 2 frames (200 ms) after the one it is given"));
+  EXPECT_THAT(run.out, HasSubstr("the network at work:  later than 9000 ms: 0 of "));
+  EXPECT_THAT(run.out, HasSubstr("looks of the network"));
+  const auto log = test::CommandRun::json_lines(test::text_of(folder / "one/flight.jsonl"));
+  ASSERT_EQ(log.size(), 1u);
+  const auto& played = log[0]["played"];
+  EXPECT_EQ(played["offered"], 9);
+  EXPECT_EQ(played["delivered"], log[0]["frames"]);
+  EXPECT_GE(played["network"]["looks"], 1);
+  EXPECT_EQ(played["network"]["backend"], "cpu");
+  EXPECT_EQ(played["network"]["at_work"]["frames"].get<int>() + played["network"]["at_rest"]["frames"].get<int>(),
+            played["delivered"].get<int>());
+  EXPECT_THAT(test::run_berth({"flight", "--fps", "10", "--count", "2"}).err, HasSubstr("one flight"));
+}
+
 TEST(CliFlight, GoesOnWithACampaign) {
   const test::ScratchFolder folder;
   const auto fly = [&](const char* count) {

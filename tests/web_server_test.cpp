@@ -89,7 +89,8 @@ TEST(WebAddress, IsReadInEveryForm) {
   is("[::1]:8041", "::1", 8041);
   is("[::1]", "::1", 8040);
   is("127.0.0.1:0", "127.0.0.1", 0);
-  for (const char* wrong : {"127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:80a", "[::1", "[::1]x", "a b:80", "1234567", "http://a/:1"}) {
+  for (const char* wrong :
+       {"127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:80a", "[::1", "[::1]x", "a b:80", "1234567", "http://a/:1"}) {
     EXPECT_THAT(test::complaint([&] { parse_web_address(wrong); }),
                 testing::AllOf(StartsWith(std::string("--view ") + wrong), HasSubstr("e.g. 127.0.0.1:8040")));
   }
@@ -116,8 +117,9 @@ TEST_F(WebServerTest, HandsOutThePageAndWhatItNeeds) {
 }
 
 TEST_F(WebServerTest, HasNoFiles) {
-  for (const char* path : {"/../../etc/passwd", "/..%2f..%2fetc%2fpasswd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd",
-                           "/view.css/../../../etc/passwd", "/view.css%00", "/viewXcss", "/etc/passwd", "/three.min.js/"}) {
+  for (const char* path :
+       {"/../../etc/passwd", "/..%2f..%2fetc%2fpasswd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd",
+        "/view.css/../../../etc/passwd", "/view.css%00", "/viewXcss", "/etc/passwd", "/three.min.js/"}) {
     const std::string answer = answer_to_get(port, path);
     EXPECT_THAT(answer, StartsWith("HTTP/1.1 404")) << path;
     EXPECT_THAT(answer, Not(HasSubstr("root:"))) << path;
@@ -289,7 +291,9 @@ TEST_F(WebServerTest, SaysWhenItsAddressIsTaken) {
   WebContent content;
   WebFeed other;
   content.feed = &other;
-  EXPECT_THAT(test::complaint([&] { WebServer(WebAddress{"127.0.0.1", port}, content); }),
+  EXPECT_THAT(test::complaint([&] {
+                WebServer(WebAddress{"127.0.0.1", port}, content);
+              }),
               testing::AllOf(StartsWith("--view 127.0.0.1:" + std::to_string(port)), HasSubstr("another port")));
 }
 

@@ -36,8 +36,15 @@ const std::string kScenario = std::string(BERTH_SOURCE_DIR) + "/scenarios/approa
 std::array<double, 9> turned(double a, double b, double c) {
   const double ca = std::cos(a * kDegree), sa = std::sin(a * kDegree), cb = std::cos(b * kDegree),
                sb = std::sin(b * kDegree), cc = std::cos(c * kDegree), sc = std::sin(c * kDegree);
-  return {cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa, sc * cb, sc * sb * sa + cc * ca,
-          sc * sb * ca - cc * sa, -sb, cb * sa, cb * ca};
+  return {cc * cb,
+          cc * sb * sa - sc * ca,
+          cc * sb * ca + sc * sa,
+          sc * cb,
+          sc * sb * sa + cc * ca,
+          sc * sb * ca - cc * sa,
+          -sb,
+          cb * sa,
+          cb * ca};
 }
 
 /// rotation(w) · R for a small w, rad, about the camera's axes.
@@ -114,7 +121,8 @@ struct Frame {
     result.stamp.mid_exposure_ns = static_cast<std::int64_t>(time_s * 1e9);
   }
   ObservedFrame observed() const {
-    return {label, image.view(), result, 0, Mode::docking, camera, nullptr, nullptr, truth, truth_targets, "simd", 0, {}, nullptr, nullptr};
+    return {label,         image.view(), result, 0,  Mode::docking, camera, nullptr, nullptr, truth,
+            truth_targets, "simd",       0,      {}, nullptr,       nullptr};
   }
 };
 
@@ -230,8 +238,8 @@ Json data_of(const std::string& page) {
 TEST(WebReport, TellsTheRunAsOnePage) {
   const ScratchFolder folder;
   const std::string path = folder / "run.html", log = folder / "log.jsonl";
-  const test::CommandRun run = test::run_berth(
-      {"run", "--source", "sim:" + kScenario, "--max-frames", "6", "--backend", "simd", "--json", log, "--report", path});
+  const test::CommandRun run = test::run_berth({"run", "--source", "sim:" + kScenario, "--max-frames", "6", "--backend",
+                                                "simd", "--json", log, "--report", path});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("report      " + path));
   const std::string page = text_of(path);
@@ -241,7 +249,8 @@ TEST(WebReport, TellsTheRunAsOnePage) {
   std::size_t poses = 0;
   for (const auto& line : test::CommandRun::json_lines(text_of(log))) {
     for (const auto& detection : line["detections"]) {
-      const std::string name = detection["family"].get<std::string>() + " " + std::to_string(detection["id"].get<int>());
+      const std::string name =
+          detection["family"].get<std::string>() + " " + std::to_string(detection["id"].get<int>());
       const double time_s = (line["mid_exposure_ns"].get<double>() - 1e6) / 1e9;
       int found = 0;
       for (const Json& sample : data["samples"]) {

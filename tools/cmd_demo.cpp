@@ -17,6 +17,7 @@ namespace fs = std::filesystem;
 constexpr const char* kExamples = R"(Examples:
   berth demo
   berth demo --backend opencl --out /tmp/demo
+  berth demo --fps 30 --frames 240                in real time, once its frames are drawn
   berth demo --scenario scenarios/rectangle.toml --max-frames 100
 
 Writes into --out the whole flight: flight.svg, flight.png, flight.jsonl. With --scenario, markers alone: log.jsonl (a
@@ -36,6 +37,7 @@ int show_scenario(const DemoCommand& command, Console& console) {
   StreamOptions stream;
   stream.engine = command.flight.engine;
   stream.max_frames = command.max_frames;
+  stream.pace = command.flight.pace;
   stream.log = (out / "log.jsonl").string();
   stream.svg = (out / "trajectory.svg").string();
   stream.picture = (out / "markers.png").string();
@@ -58,7 +60,10 @@ void add_demo(CLI::App& app, Console& console, int& exit_code) {
                               ->type_name("FILE")
                               ->excludes(flight.network)
                               ->excludes(flight.seed)
-                              ->excludes(flight.frames);
+                              ->excludes(flight.frames)
+                              ->excludes(command->get_option("--nav-backend"))
+                              ->excludes(command->get_option("--nav-frames"))
+                              ->excludes(command->get_option("--nav-record"));
   command->add_option("--max-frames", options->max_frames, "end a scenario after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str()

@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 constexpr const char* kExamples = R"(Examples:
   berth flight                                     one flight: flight.svg, flight.png, flight.jsonl
   berth flight --seed 7 --backend vulkan
+  berth flight --fps 30 --frames 300 --nav-backend opencl    in real time, the network on another backend
   berth flight --count 1000 --jobs 2 --out flights     a campaign; the same command again goes on with it
 
 A flight goes from 6 m to 0.15 m before the marker. All of it is a function of its seed.)";
@@ -186,6 +187,9 @@ void add_flight(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--out", options->out, "folder for logs and pictures")->type_name("DIR")->capture_default_str();
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
+    if (options->pace.fps != 0 && (options->count != 1 || options->empty)) {
+      throw Error("--fps plays one flight; leave --count and --empty out");
+    }
     exit_code = options->count == 1 && !options->empty ? show_flight(*options, console) : fly_many(*options, console);
   });
 }

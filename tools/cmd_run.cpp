@@ -1,5 +1,7 @@
 // berth run: markers in a stream of frames.
+#include <algorithm>
 #include <memory>
+#include <vector>
 
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
@@ -22,6 +24,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/port.toml --target targets/port.yaml
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
   berth run --source v4l2:video0,width=640,height=480,fps=120 --camera cam.yaml --size 0.08 --filter
+  berth run --source v4l2:video0,width=640,height=480,fps=120 --stream --track    at its own pace
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops
   berth run --source v4l2:video0 --camera cam.yaml --size 0.08 --ros --ros-namespace robot1    to ROS 2 nodes
@@ -29,33 +32,6 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml --report approach.html    the run as one page
 
 Ctrl-C ends the stream cleanly, with its summary.)";
-
-void add_pace_options(CLI::App& command, PaceOptions& pace) {
-  CLI::Option* fps = command
-                         .add_option("--fps", pace.fps,
-                                     "play the frames in real time, so many a second, as a camera would: the newest "
-                                     "wins, drops are counted")
-                         ->type_name("N");
-  const auto paced = [&](CLI::Option* option, const char* type) {
-    option->type_name(type)->needs(fps)->group("With --fps");
-  };
-  paced(command.add_option("--minutes", pace.minutes, "play them round and round until then"), "M");
-  paced(command.add_option("--slots", pace.slots, "frames under way at most, 2 or more")->capture_default_str(), "N");
-  paced(command
-            .add_option("--behind", pace.behind,
-                        "with --track: windows go by the result so many frames before; 1 lets nothing overlap")
-            ->capture_default_str(),
-        "N");
-  paced(command.add_option("--cores", pace.cores, "the device's core and the host's, e.g. 0,1; or one for both")
-            ->delimiter(','),
-        "A,B");
-  paced(command.add_option("--realtime", pace.realtime, "SCHED_FIFO priority, 1 to 99, for what it is allowed to"),
-        "P");
-  paced(command.add_option("--deadline", pace.deadlines_ms, "later frames are counted, ms, one or two")
-            ->delimiter(',')
-            ->capture_default_str(),
-        "MS,MS");
-}
 
 }  // namespace
 
@@ -94,15 +70,49 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       ->capture_default_str();
   add_report_option(*command, options->web);
   add_view_options(*command, options->web);
-  add_pace_options(*command, options->stream.pace);
+  PaceOptions& pace = options->stream.pace;
+  CLI::Option* fps = command
+                         ->add_option("--fps", pace.fps,
+                                      "play the frames in real time, so many a second, as a camera would: the newest "
+                                      "wins, drops are counted")
+                         ->type_name("N");
+  command->add_option("--minutes", pace.minutes, "play them round and round until then")
+      ->type_name("M")
+      ->needs(fps)
+      ->group(kPaceGroup);
+  CLI::Option* behind =
+      command
+          ->add_option("--behind", pace.behind,
+                       "with --track: windows go by the result so many frames before; 1 lets nothing overlap")
+          ->type_name("N")
+          ->group(kPaceGroup)
+          ->capture_default_str();
+  CLI::Option* stream = command
+                            ->add_flag("--stream", pace.stream,
+                                       "a camera's frames through the pipeline: device and host overlap, the newest "
+                                       "wins, drops and latencies are counted; the options below imply it")
+                            ->excludes(fps);
+  std::vector<CLI::Option*> pipeline = add_pace_options(*command, pace);
+  pipeline.push_back(behind);
   add_ros_options(*command, options->ros);
   add_engine_options(*command, options->stream.engine);
   add_deviation_options(*command, options->stream.engine);
   add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
-  command->callback([options, &console, &exit_code] {
-    if (options->stream.pace.fps != 0 && options->source.rfind("v4l2:", 0) == 0) {
-      throw Error(options->source + ": --fps plays recordings, a camera has a pace of its own; leave --fps out");
+  command->callback([options, &console, &exit_code, pipeline, stream] {
+    PaceOptions& given = options->stream.pace;
+    const bool is_camera = options->source.rfind("v4l2:", 0) == 0;
+    if (given.fps != 0 && is_camera) {
+      throw Error(options->source +
+                  ": --fps plays recordings, a camera has a pace of its own; leave --fps out, --stream takes its "
+                  "frames through the pipeline");
+    }
+    const auto set = std::find_if(pipeline.begin(), pipeline.end(), [](CLI::Option* o) { return o->count() > 0; });
+    if (is_camera) {
+      given.stream = given.stream || set != pipeline.end();
+    } else if (stream->count() > 0 || (set != pipeline.end() && given.fps == 0)) {
+      throw Error((stream->count() > 0 ? "--stream" : (*set)->get_name()) +
+                  " is for a camera's frames (v4l2:); play those of a recording by --fps");
     }
     if (options->stream.track && !options->stream.engine.target_files.empty()) {
       throw Error(

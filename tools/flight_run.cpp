@@ -7,9 +7,8 @@
 #include "quantile.hpp"
 
 namespace berth::cli {
-namespace {
 
-FlightPoint point_of(int index, const navset::FlightFrame& truth, const PilotFrame& found) {
+FlightPoint flight_point(int index, const navset::FlightFrame& truth, const PilotFrame& found) {
   FlightPoint point;
   point.frame = index;
   point.mode = found.mode;
@@ -27,8 +26,6 @@ FlightPoint point_of(int index, const navset::FlightFrame& truth, const PilotFra
   point.off = std::sqrt(dx * dx + dy * dy) / truth.d_px;
   return point;
 }
-
-}  // namespace
 
 int FlightLog::first(Mode mode) const {
   const auto found =
@@ -77,7 +74,7 @@ FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const Flight
     FrameStamp stamp;
     stamp.sequence = static_cast<u64>(i);
     const PilotFrame& found = pilot.look(frame.image.view(), stamp);
-    log.points.push_back(point_of(i, frame, found));
+    log.points.push_back(flight_point(i, frame, found));
     if (seen) seen(log.points.back(), frame, found);
   }
   return log;

@@ -44,6 +44,9 @@ struct FlightLog {
 /// What simulated flights need of a pilot, beside the network.
 PilotConfig flight_pilot(const std::string& network);
 
+/// What a pilot made of a frame, beside the truth of the frame that its position is of.
+FlightPoint flight_point(int index, const navset::FlightFrame& truth, const PilotFrame& found);
+
 /// Flies with a new pilot. `seen` is called after every frame.
 using FlightWatcher = std::function<void(const FlightPoint&, const navset::FlightFrame&, const PilotFrame&)>;
 FlightLog fly(const navset::Flight& flight, u64 seed, Pilot& pilot, const FlightWatcher& seen = {});

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "film_strip.hpp"
+#include "flight_play.hpp"
 #include "flight_run.hpp"
 #include "flight_svg.hpp"
 #include "output_file.hpp"
@@ -69,21 +70,58 @@ FlightOnly add_flight_options(CLI::App& command, FlightOptions& options) {
                      ->check(CLI::Range(5, 100000))
                      ->capture_default_str();
   add_backend_options(command, options.engine);
+  CLI::Option* backend = command
+                             .add_option("--nav-backend", options.navigation.backend,
+                                         "the network's backend, where it is not to be the marker's")
+                             ->type_name("NAME");
+  CLI::Option* fps = command
+                         .add_option("--fps", options.pace.fps,
+                                     "play one flight in real time, so many frames a second: the network beside the "
+                                     "marker's part, drops and late frames counted")
+                         ->type_name("N");
+  command
+      .add_option("--nav-frames", options.navigation.frames,
+                  "with --fps: frames until the network's word on one counts [measured]")
+      ->type_name("N")
+      ->needs(fps);
+  command
+      .add_option("--nav-record", options.navigation.record,
+                  "with --fps: the network's backend and frames from this file; where it is not there, every backend "
+                  "is measured and the file written")
+      ->type_name("FILE")
+      ->needs(fps)
+      ->excludes(backend);
+  for (CLI::Option* option : add_pace_options(command, options.pace)) option->needs(fps);
   return added;
+}
+
+std::string flight_network(const FlightOptions& options) {
+  return options.network.empty() ? shared_file("models/lite.berthnet", "name a network by --network") : options.network;
 }
 
 Crew::Crew(const FlightOptions& options) : backend(std::move(open_chosen_backends(options.engine).backends[0])) {
   const CameraModel camera = navset::Flight::camera();
-  const std::string network =
-      options.network.empty() ? shared_file("models/lite.berthnet", "name a network by --network") : options.network;
-  pilot = std::make_unique<Pilot>(*backend, *backend, camera.width, camera.height, flight_pilot(network));
+  if (!options.navigation.backend.empty()) {
+    navigation = open_for_navigation(options.navigation.backend, options.engine);
+  }
+  pilot = std::make_unique<Pilot>(*backend, navigation ? *navigation : *backend, camera.width, camera.height,
+                                  flight_pilot(flight_network(options)));
 }
 
-int show_flight(const FlightOptions& options, Console& console) {
+namespace {
+
+PlayedFlight fly_step_by_step(const navset::Flight& flight, const FlightOptions& options, Console& console,
+                              const FlightWatcher& seen) {
   const Crew crew(options);
+  console.out() << fmt::format("{} on {}\n", crew.backend->name(), crew.backend->device().name);
+  return {fly(flight, options.seed, *crew.pilot, seen), {}};
+}
+
+}  // namespace
+
+int show_flight(const FlightOptions& options, Console& console) {
   const navset::Flight flight(options.seed, options.frames);
-  console.out() << fmt::format("flight {}: {}; {} on {}\n", options.seed, flight.title(), crew.backend->name(),
-                               crew.backend->device().name);
+  console.out() << fmt::format("flight {}: {}\n", options.seed, flight.title());
   make_folder(options.out, "name another by --out");
   FilmStrip strip(navset::Flight::camera(), navset::kTargetDiameter_m);
   FlightTable table(options.frames, console);
@@ -93,11 +131,16 @@ int show_flight(const FlightOptions& options, Console& console) {
     }
     table.add(point);
   };
-  const FlightLog log = fly(flight, options.seed, *crew.pilot, watch);
+  const bool is_played = options.pace.fps != 0;
+  const PlayedFlight flown =
+      is_played ? play_flight(flight, options, console, watch) : fly_step_by_step(flight, options, console, watch);
   table.end();
+  const FlightLog& log = flown.log;
   const fs::path out(options.out);
+  Json line = to_json(log);
+  if (is_played) line["played"] = flown.counts;
   write_file((out / "flight.svg").string(), "the drawing", flight_svg(log));
-  write_file((out / "flight.jsonl").string(), "the log", to_line(to_json(log)) + "\n");
+  write_file((out / "flight.jsonl").string(), "the log", to_line(line) + "\n");
   strip.write((out / "flight.png").string(), 3);
   console.out() << fmt::format("{}; longest gap {} frames, {} frames with something else for the target\n",
                                log.docked() ? "docked" : "NOT docked", log.longest_gap(), log.wrong())

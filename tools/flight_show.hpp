@@ -7,6 +7,8 @@
 #include "berth/pilot.hpp"
 #include "commands.hpp"
 #include "engine.hpp"
+#include "navigation_choice.hpp"
+#include "paced_play.hpp"
 
 namespace berth::cli {
 
@@ -15,6 +17,9 @@ struct FlightOptions {
   std::string network;  ///< a file; empty for the one that comes with Berth
   std::string out;      ///< folder for drawing, frames and log
   EngineOptions engine;
+  NavigationOptions navigation;
+  /// In real time, through a PilotStream; not with fps 0.
+  PaceOptions pace;
   std::uint64_t seed = 1;
   int frames = 240;
 };
@@ -29,10 +34,15 @@ struct FlightOnly {
 /// Adds these and the backend's.
 FlightOnly add_flight_options(CLI::App& command, FlightOptions& options);
 
-/// A pilot for simulated flights and the backend it runs on. Throws Error.
+/// The network's file. Throws Error where Berth's own is not found.
+std::string flight_network(const FlightOptions& options);
+
+/// A pilot for simulated flights and the backends it runs on. Throws Error.
 struct Crew {
   explicit Crew(const FlightOptions& options);
   std::unique_ptr<Backend> backend;
+  /// The network's, where it is another.
+  std::unique_ptr<Backend> navigation;
   std::unique_ptr<Pilot> pilot;
 };
 

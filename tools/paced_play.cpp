@@ -5,11 +5,8 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
-#include <exception>
 #include <fstream>
-#include <future>
 #include <utility>
 
 #include "berth/error.hpp"
@@ -17,6 +14,7 @@
 #include "frame/digest.hpp"
 #include "monotonic.hpp"
 #include "pipeline/thread_setup.hpp"
+#include "pipeline_show.hpp"
 #include "result_digest.hpp"
 #include "source_arguments.hpp"
 
@@ -26,7 +24,6 @@ namespace {
 constexpr const char* kCommandLine = "command line";
 constexpr std::size_t kMostInMemory = 2'000'000'000;
 constexpr std::int64_t kSampleEveryNs = 10'000'000'000;
-constexpr std::array<std::pair<const char*, double>, 3> kQuantiles = {{{"p50", 0.5}, {"p99", 0.99}, {"p99.9", 0.999}}};
 
 Error bad_option(const char* option, const std::string& value, const std::string& remedy) {
   return bad_field(kCommandLine, option, value, remedy);
@@ -48,9 +45,28 @@ double megabytes(std::size_t bytes) { return static_cast<double>(bytes) / 1e6; }
 
 }  // namespace
 
+std::vector<CLI::Option*> add_pace_options(CLI::App& command, PaceOptions& pace) {
+  std::vector<CLI::Option*> added;
+  const auto paced = [&](CLI::Option* option, const char* type) {
+    option->type_name(type)->group(kPaceGroup);
+    added.push_back(option);
+  };
+  paced(command.add_option("--slots", pace.slots, "frames under way at most, 2 or more")->capture_default_str(), "N");
+  paced(command.add_option("--cores", pace.cores, "the device's core and the host's, e.g. 0,1; or one for both")
+            ->delimiter(','),
+        "A,B");
+  paced(command.add_option("--realtime", pace.realtime, "SCHED_FIFO priority, 1 to 99, for what it is allowed to"),
+        "P");
+  paced(command.add_option("--deadline", pace.deadlines_ms, "later frames are counted, ms, one or two")
+            ->delimiter(',')
+            ->capture_default_str(),
+        "MS,MS");
+  return added;
+}
+
 PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig detector,
                                     std::optional<TrackerConfig> tracking) {
-  if (!(options.fps > 0) || options.fps > 100000) {
+  if (!options.stream && (!(options.fps > 0) || options.fps > 100000)) {
     throw bad_option("--fps", std::to_string(options.fps), "give frames a second, above 0 and at most 100000");
   }
   if (!(options.minutes >= 0) || options.minutes > 60 * 24 * 365) {
@@ -108,53 +124,26 @@ PacedPlay::PacedPlay(std::vector<SourceFrame> frames, const PaceOptions& options
       options_(options),
       total_(frames_to_play(frames_.size(), options)),
       pipeline_(backends, frames_.front().image.width(), frames_.front().image.height(), config),
+      camera_(options_.fps, total_, options_.realtime),
       seen_(frames_.size()) {
   resident_kb_.reserve(static_cast<std::size_t>(options_.minutes * 60e9 / static_cast<double>(kSampleEveryNs)) + 16);
 }
 
 PacedPlay::~PacedPlay() {
-  ended_ = true;
-  if (camera_.joinable()) camera_.join();
+  camera_.end();
+  camera_.join();
   if (options_.realtime > 0) make_ordinary();
 }
 
 void PacedPlay::start() {
   pipeline_.start();
-  std::promise<void> ready;
-  std::future<void> set = ready.get_future();
-  camera_ = std::thread([this, ready = std::move(ready)]() mutable {
-    try {
-      name_thread("berth-camera");
-      if (options_.realtime > 0) make_realtime(options_.realtime);
-      ready.set_value();
-    } catch (...) {
-      ready.set_exception(std::current_exception());
-      return;
-    }
-    film();
-    pipeline_.close();
-  });
-  set.get();
+  camera_.start(
+      [this](std::uint64_t i, const FrameStamp& stamp) {
+        return pipeline_.push(frames_[i % frames_.size()].image.view(), stamp);
+      },
+      [this] { pipeline_.close(); });
   // Or a busy machine keeps results from being read, and slots from getting free.
   if (options_.realtime > 0) make_realtime(std::max(1, options_.realtime - 1));
-}
-
-void PacedPlay::film() {
-  const auto began = std::chrono::steady_clock::now();
-  const double period_ns = 1e9 / options_.fps;
-  for (std::uint64_t i = 0; i < total_ && !ended_; ++i) {
-    const std::chrono::nanoseconds since(static_cast<std::int64_t>(static_cast<double>(i) * period_ns));
-    const auto due = began + since;
-    std::this_thread::sleep_until(due);
-    FrameStamp stamp;
-    stamp.sequence = i;
-    stamp.clock = "monotonic";
-    stamp.mid_exposure_ns = std::chrono::nanoseconds(due.time_since_epoch()).count();
-    stamp.exposure_start_ns = stamp.mid_exposure_ns;
-    stamp.arrival_ns = monotonic_ns();
-    if (static_cast<double>(stamp.arrival_ns - stamp.mid_exposure_ns) > period_ns) ++camera_late_;
-    if (!pipeline_.push(frames_[i % frames_.size()].image.view(), stamp)) return;
-  }
 }
 
 const PipelineFrame* PacedPlay::next() {
@@ -162,7 +151,7 @@ const PipelineFrame* PacedPlay::next() {
   if (frame != nullptr) {
     note_result(*frame);
   } else {
-    if (camera_.joinable()) camera_.join();
+    camera_.join();
     pipeline_.stop();
   }
   sample_memory();
@@ -208,11 +197,9 @@ void PacedPlay::describe(std::ostream& out) const {
   for (const SourceFrame& frame : frames_) {
     bytes += static_cast<std::size_t>(frame.image.width()) * static_cast<std::size_t>(frame.image.height());
   }
-  const PipelineMemory memory = pipeline_.memory();
   out << fmt::format("camera      {:g} frames/s, {} frames from {} in memory ({:.1f} MB)\n", options_.fps, total_,
                      frames_.size(), megabytes(bytes));
-  out << fmt::format("pipeline    {} slots: {:.1f} MB for the device, {:.1f} MB for the host, no more after this",
-                     memory.slots, megabytes(memory.device_bytes), megabytes(memory.host_bytes));
+  print_memory(out, pipeline_.memory());
   if (!options_.cores.empty()) out << fmt::format("; cores {}", fmt::join(options_.cores, ", "));
   if (options_.realtime > 0) out << fmt::format("; SCHED_FIFO {}", options_.realtime);
   out << '\n';
@@ -220,27 +207,10 @@ void PacedPlay::describe(std::ostream& out) const {
 
 void PacedPlay::sum_up(std::ostream& out) const {
   const PipelineCounts counts = pipeline_.counts();
-  out << fmt::format("{} frames offered, {} delivered, {} dropped", counts.offered, counts.delivered,
-                     counts.all_dropped());
-  if (counts.all_dropped() > 0) {
-    out << fmt::format(" (waiting for device {}, host {}, reader {})", counts.dropped[0], counts.dropped[1],
-                       counts.dropped[2]);
-  }
-  if (counts.run_again > 0) out << fmt::format(", {} run again on another backend", counts.run_again);
-  out << fmt::format("; the camera's thread was late for {}\n", camera_late_.load());
-  out << fmt::format("{:<11} {:>9} {:>9} {:>9} {:>9}  ms\n", "", "p50", "p99", "p99.9", "max");
-  for (std::size_t i = 0; i < kLaps; ++i) {
-    const LatencyHistogram& times = pipeline_.times(static_cast<Lap>(i));
-    if (times.max() == 0) continue;
-    out << fmt::format("{:<11}", name_of(static_cast<Lap>(i)));
-    for (const auto& [name, share] : kQuantiles) out << fmt::format(" {:>9.3f}", ms_of(times.quantile(share)));
-    out << fmt::format(" {:>9.3f}\n", ms_of(times.max()));
-  }
-  for (std::size_t i = 0; i < options_.deadlines_ms.size(); ++i) {
-    out << fmt::format("{} {:g} ms: {} of {}", i == 0 ? "later than" : "; than", options_.deadlines_ms[i],
-                       counts.late[i], counts.delivered);
-  }
-  out << '\n';
+  print_counts(out, counts);
+  out << fmt::format("; the camera's thread was late for {}\n", camera_.late());
+  print_laps(out, pipeline_);
+  print_late(out, options_.deadlines_ms, counts.late, counts.delivered);
   if (resident_kb_.size() > 1) {
     const auto at = static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, resident_kb_.size() - 1));
     out << fmt::format("resident    {:.1f} MB at the start, {:.1f} after {} s, then {:.1f} to {:.1f}\n",
@@ -254,25 +224,10 @@ void PacedPlay::sum_up(std::ostream& out) const {
 }
 
 Json PacedPlay::summary() const {
-  const PipelineCounts counts = pipeline_.counts();
   const PipelineMemory memory = pipeline_.memory();
-  Json json = {{"fps", options_.fps},
-               {"offered", counts.offered},
-               {"delivered", counts.delivered},
-               {"run_again", counts.run_again},
-               {"camera_late", camera_late_.load()}};
-  for (std::size_t i = 0; i < kDropCauses; ++i) {
-    json["dropped"][name_of(static_cast<DropCause>(i))] = counts.dropped[i];
-  }
-  for (std::size_t i = 0; i < options_.deadlines_ms.size(); ++i) {
-    json["late"].push_back({{"deadline_ms", options_.deadlines_ms[i]}, {"frames", counts.late[i]}});
-  }
-  for (std::size_t i = 0; i < kLaps; ++i) {
-    const LatencyHistogram& times = pipeline_.times(static_cast<Lap>(i));
-    Json& row = json["times_ms"][name_of(static_cast<Lap>(i))];
-    for (const auto& [name, share] : kQuantiles) row[name] = ms_of(times.quantile(share));
-    row["max"] = ms_of(times.max());
-  }
+  Json json = to_json(pipeline_, options_.deadlines_ms);
+  json["fps"] = options_.fps;
+  json["camera_late"] = camera_.late();
   json["slots"] = memory.slots;
   json["device_bytes"] = memory.device_bytes;
   json["host_bytes"] = memory.host_bytes;

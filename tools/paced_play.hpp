@@ -1,12 +1,11 @@
 #pragma once
 
-#include <atomic>
+#include <CLI/App.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "berth/pipeline.hpp"
@@ -14,12 +13,17 @@
 #include "console.hpp"
 #include "frame_json.hpp"
 #include "interrupt.hpp"
+#include "paced_camera.hpp"
+#include "play.hpp"
 
 namespace berth::cli {
 
-/// How frames are played at a camera's pace; not at all with `fps` 0.
+/// How frames are taken at a camera's pace, through a pipeline.
 struct PaceOptions {
+  /// Frames of recordings are played at that rate; 0 for not at all.
   double fps = 0;
+  /// Frames of a camera, at its own rate.
+  bool stream = false;
   /// The frames go round until then; 0 for once through.
   double minutes = 0;
   int slots = 4;
@@ -31,6 +35,11 @@ struct PaceOptions {
   std::vector<double> deadlines_ms = {14.3, 33};
 };
 
+/// What these and other options of the pipeline stand under in --help.
+constexpr const char* kPaceGroup = "At a camera's pace";
+/// --slots, --cores, --realtime, --deadline
+std::vector<CLI::Option*> add_pace_options(CLI::App& command, PaceOptions& pace);
+
 /// Throws Error that names the field, its value and the remedy.
 PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig detector,
                                     std::optional<TrackerConfig> tracking = {});
@@ -40,14 +49,13 @@ PipelineConfig make_pipeline_config(const PaceOptions& options, DetectorConfig d
 std::vector<SourceFrame> read_to_play(Source& source, std::uint64_t most, Console& console,
                                       const InterruptWatch& interrupt);
 
-/// Frames in memory, played in real time into a pipeline by a camera's thread. A frame's camera time is when it was
-/// due, so that a camera held up by a busy machine shows as latency.
-class PacedPlay {
+/// Frames in memory, played in real time into a pipeline.
+class PacedPlay final : public Play {
  public:
   /// Frames of one size, one at least.
   PacedPlay(std::vector<SourceFrame> frames, const PaceOptions& options, const std::vector<Backend*>& backends,
             const PipelineConfig& config);
-  ~PacedPlay();
+  ~PacedPlay() override;
   PacedPlay(const PacedPlay&) = delete;
   PacedPlay& operator=(const PacedPlay&) = delete;
 
@@ -58,17 +66,16 @@ class PacedPlay {
   /// What a result was made of, and whether it is of the first time round.
   const SourceFrame& source_of(const PipelineFrame& frame) const;
   bool is_first_round(const PipelineFrame& frame) const { return frame.result->stamp.sequence < frames_.size(); }
-  PipelineCounts counts() const { return pipeline_.counts(); }
+  PipelineCounts counts() const override { return pipeline_.counts(); }
   /// Ends the play early.
-  void end() { ended_ = true; }
+  void end() { camera_.end(); }
 
   /// For people, at the start and at the end.
   void describe(std::ostream& out) const;
-  void sum_up(std::ostream& out) const;
-  Json summary() const;
+  void sum_up(std::ostream& out) const override;
+  Json summary() const override;
 
  private:
-  void film();
   void note_result(const PipelineFrame& frame);
   u64 digest() const;
   std::size_t frames_seen() const;
@@ -78,9 +85,7 @@ class PacedPlay {
   PaceOptions options_;
   std::uint64_t total_;
   Pipeline pipeline_;
-  std::atomic<bool> ended_ = false;
-  /// Frames pushed more than a frame's time after they were due.
-  std::atomic<std::uint64_t> camera_late_ = 0;
+  PacedCamera camera_;  // ends before the pipeline does
   /// Of each frame's first result; later ones that differ are counted.
   struct Seen {
     u64 digest = 0;
@@ -91,7 +96,6 @@ class PacedPlay {
   /// Resident memory of the process, kB, every ten seconds.
   std::vector<std::int64_t> resident_kb_;
   std::int64_t next_sample_ns_ = 0;
-  std::thread camera_;
 };
 
 }  // namespace berth::cli

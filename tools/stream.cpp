@@ -11,6 +11,7 @@
 
 #include "berth/error.hpp"
 #include "bundle_show.hpp"
+#include "camera_play.hpp"
 #include "frame_json.hpp"
 #include "interrupt.hpp"
 #include "live_view.hpp"
@@ -48,6 +49,8 @@ class StreamRun {
     const InterruptWatch interrupt;
     if (options_.pace.fps != 0) {
       play(interrupt);
+    } else if (options_.pace.stream) {
+      play_camera(interrupt);
     } else {
       while (options_.max_frames == 0 || summary_.frames() < options_.max_frames) {
         const std::optional<SourceFrame> frame = next_readable(source_, console_, interrupt);
@@ -78,23 +81,57 @@ class StreamRun {
     people_.flush();
     playing_ = &paced;
     paced.start();
-    std::size_t backend = 0;
     while (const PipelineFrame* frame = paced.next()) {
-      const SourceFrame& source = paced.source_of(*frame);
-      if (frame->backend != backend) {
-        console_.note(source.label + ": the device was lost; the frame was run again on " +
-                      engine_->backends()[frame->backend]->name());
-        backend = frame->backend;
-      }
-      tracked_ = frame->tracked;
-      if (tracked_ != nullptr) summary_.add_search(*tracked_, 0);
-      FrameResult result = *frame->result;
-      gather(stream_frame(source), result, 0, frame, paced.is_first_round(*frame));
+      gather_paced(stream_frame(paced.source_of(*frame)), *frame, paced.is_first_round(*frame));
       if (interrupt.came()) paced.end();
     }
     playing_ = nullptr;
     view_.finish();
     sum_up(interrupt.came(), &paced);
+  }
+
+  /// A camera's frames, each written where the device takes it from.
+  void play_camera(const InterruptWatch& interrupt) {
+    auto* const camera = dynamic_cast<CameraSource*>(&source_);
+    if (camera == nullptr) throw Error("--stream takes a camera's frames; play recordings by --fps");
+    if (!options_.engine.lockstep.empty()) throw Error("--lockstep compares every frame; leave --stream out");
+    SourceFrame like;
+    like.image = GrayImage(camera->width(), camera->height());
+    like.label = options_.engine.camera_file;
+    make_engine(like);
+    refuse_poses(stream_frame(like));
+    const DetectorConfig config = engine_->config_for(camera->width(), camera->height());
+    CameraPlay live(*camera, options_.pace, engine_->backends(),
+                    make_pipeline_config(options_.pace, config, tracking()), options_.max_frames);
+    live.describe(people_);
+    people_.flush();
+    playing_ = &live;
+    live.start();
+    const std::vector<TruthMarker> no_truth;
+    const std::vector<TruthTarget> no_targets;
+    while (!live.has_ended()) {
+      if (const PipelineFrame* frame = live.next()) {
+        live_fps_ = live.frames_per_second();
+        gather_paced({camera->label_of(frame->result->stamp), frame->image, no_truth, no_targets}, *frame, true);
+      }
+      for (const std::string& complaint : live.take_complaints()) console_.complain(complaint);
+      if (interrupt.came()) live.end();
+    }
+    playing_ = nullptr;
+    view_.finish();
+    sum_up(interrupt.came(), &live);
+  }
+
+  void gather_paced(const StreamFrame& source, const PipelineFrame& frame, bool first_round) {
+    if (frame.backend != paced_backend_) {
+      console_.note(source.label + ": the device was lost; the frame was run again on " +
+                    engine_->backends()[frame.backend]->name());
+      paced_backend_ = frame.backend;
+    }
+    tracked_ = frame.tracked;
+    if (tracked_ != nullptr) summary_.add_search(*tracked_, 0);
+    FrameResult result = *frame.result;
+    gather(source, result, 0, &frame, first_round);
   }
 
   std::optional<std::size_t> frames_expected() const {
@@ -158,7 +195,7 @@ class StreamRun {
                                  frame.truth_targets,
                                  backend.name(),
                                  paced != nullptr ? 0 : frame_ns_,
-                                 source_.health(),
+                                 playing_ != nullptr ? playing_->health() : source_.health(),
                                  options_.filter ? &filters_ : nullptr,
                                  playing_ != nullptr ? &counts : nullptr};
     for (const auto& observer : options_.observers) observer->observe(observed);
@@ -284,9 +321,7 @@ class StreamRun {
 
   void show(const FrameResult& result, const std::vector<TruthMarker>& truth) {
     const std::size_t n = result.detections.size();
-    std::string line =
-        fmt::format("{:4.0f} fps  {} marker{}",
-                    options_.pace.fps > 0 ? options_.pace.fps : summary_.frames_per_second(), n, n == 1 ? " " : "s");
+    std::string line = fmt::format("{:4.0f} fps  {} marker{}", rate(), n, n == 1 ? " " : "s");
     if (result.status == FrameStatus::overflow) line += ", overflow";
     std::vector<std::string> table;
     const Detection* largest = nullptr;
@@ -312,6 +347,11 @@ class StreamRun {
     view_.show(summary_.frames(), line, table, brief);
   }
 
+  double rate() const {
+    if (options_.pace.fps > 0) return options_.pace.fps;
+    return options_.pace.stream ? live_fps_ : summary_.frames_per_second();
+  }
+
   static double area_of(const Detection& d) {
     double twice = 0;
     for (int i = 0; i < 4; ++i) {
@@ -331,7 +371,7 @@ class StreamRun {
     return text;
   }
 
-  void sum_up(bool by_interrupt, const PacedPlay* paced = nullptr) {
+  void sum_up(bool by_interrupt, const Play* paced = nullptr) {
     if (by_interrupt) people_ << "interrupted\n";
     summary_.print_counts(people_);
     if (paced != nullptr) {
@@ -359,11 +399,13 @@ class StreamRun {
   SystematicErrors errors_;
   std::vector<std::optional<std::array<double, 36>>> systematic_;  // of the frame's detections
   bool size_given_ = false, refused_ = false;
+  std::size_t paced_backend_ = 0;  // that the pipeline's last frame was run on
+  double live_fps_ = 0;            // a camera's results a second
   StreamSummary summary_;
   MarkerFilters filters_;
   const TrackedFrame* tracked_ = nullptr;  // of the frame at hand
   std::int64_t frame_ns_ = 0;              // its time by the wall clock
-  const PacedPlay* playing_ = nullptr;     // while frames come through a pipeline
+  const Play* playing_ = nullptr;          // while frames come through a pipeline
 };
 
 }  // namespace

@@ -9,9 +9,8 @@
 
 namespace berth::cli {
 
-/// A connection to a viewer, a socket that it closes in the end: the whole request has to come within `kRequest` and `most`
-/// bytes, and a viewer that takes nothing for `kStalled` is
-/// given up.
+/// A connection to a viewer, a socket that it closes in the end: the whole request has to come within `kRequest` and
+/// `most` bytes, and a viewer that takes nothing for `kStalled` is given up.
 class WebConnection {
  public:
   WebConnection(int socket, std::size_t most);

@@ -108,7 +108,8 @@ class WebReport final : public FrameObserver {
     // The data first: nothing that stands in them is looked through for marks.
     put(page, "<!--scripts-->", scripts);
     put(page, "<!--style-->", fmt::format("<style>\n{}\n</style>", web_asset("view.css")));
-    put(page, "<!--data-->", fmt::format("<script type=\"application/json\" id=\"data\">{}</script>", embedded(data())));
+    put(page, "<!--data-->",
+        fmt::format("<script type=\"application/json\" id=\"data\">{}</script>", embedded(data())));
     write_file(path_, "the report", page);
     people << "report      " << path_ << '\n';
   }

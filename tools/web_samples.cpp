@@ -46,8 +46,8 @@ SixAxes six_axes(const Pose& pose, const std::array<double, 36>* covariance) {
   axes.deviation.fill(kUnknown);
   if (covariance == nullptr) return axes;
   for (int i = 0; i < 3; ++i) axes.deviation[i] = deviation((*covariance)[7 * i]);
-  // A small turn w about the camera's axes is da about Rz Ry x, db about Rz y and dc about z: the rows of the inverse of
-  // that matrix take w to them. At b = ±90° the first and the last are one axis.
+  // A small turn w about the camera's axes is da about Rz Ry x, db about Rz y and dc about z: the rows of the inverse
+  // of that matrix take w to them. At b = ±90° the first and the last are one axis.
   if (cosine < 1e-3) return axes;
   const Vector about_a = {R[0], R[3], R[6]}, about_b = {-std::sin(c), std::cos(c), 0}, about_c = {0, 0, 1};
   const std::array<Vector, 3> rows = {cross(about_b, about_c), cross(about_c, about_a), cross(about_a, about_b)};
@@ -125,8 +125,10 @@ void WebSampler::add(const ObservedFrame& frame, double time_s, int object, cons
   sample.axes = six_axes(pose, uncertainty != nullptr ? &uncertainty->covariance : nullptr);
   sample.range_m = std::sqrt(dot(pose.t, pose.t));
   Vector towards = {0, 0, 1};
-  if (sample.range_m > 0) towards = {pose.t[0] / sample.range_m, pose.t[1] / sample.range_m, pose.t[2] / sample.range_m};
-  sample.range_deviation_m = uncertainty != nullptr ? deviation(variance(uncertainty->covariance, 0, towards)) : kUnknown;
+  if (sample.range_m > 0)
+    towards = {pose.t[0] / sample.range_m, pose.t[1] / sample.range_m, pose.t[2] / sample.range_m};
+  sample.range_deviation_m =
+      uncertainty != nullptr ? deviation(variance(uncertainty->covariance, 0, towards)) : kUnknown;
   sample.closing_m_s = sample.closing_deviation_m_s = kUnknown;
   if (filtered != nullptr) {
     sample.closing_m_s = -dot(towards, {filtered->velocity[0], filtered->velocity[1], filtered->velocity[2]});
@@ -154,7 +156,8 @@ const std::vector<WebSample>& WebSampler::take(const ObservedFrame& frame, doubl
     const DiscPose& pose = result.disc_targets[i];
     if (!pose.has_pose || samples_.size() == kMost) continue;
     double reach_m = 0;
-    for (const TargetDisc& disc : targets_[i].discs) reach_m = std::max({reach_m, std::abs(disc.x_m), std::abs(disc.y_m)});
+    for (const TargetDisc& disc : targets_[i].discs)
+      reach_m = std::max({reach_m, std::abs(disc.x_m), std::abs(disc.y_m)});
     add(frame, time_s, object("target", targets_[i].name, 2 * reach_m), pose.pose, &pose.uncertainty, nullptr);
   }
   for (const Detection& detection : result.detections) {

@@ -69,8 +69,8 @@ class WebSampler {
     std::size_t first_ = 0, count_ = 0;
   };
   int object(const char* kind, const std::string& name, double size_m);
-  void add(const ObservedFrame& frame, double time_s, int object, const Pose& pose,
-           const PoseUncertainty* uncertainty, const FilteredPose* filtered);
+  void add(const ObservedFrame& frame, double time_s, int object, const Pose& pose, const PoseUncertainty* uncertainty,
+           const FilteredPose* filtered);
 
   std::vector<Bundle> bundles_;
   std::vector<DiscTarget> targets_;

@@ -160,7 +160,8 @@ bool is_host_known(std::string host) {
 bool is_same(const std::string& a, const std::string& b) {
   unsigned different = a.size() == b.size() ? 0 : 1;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    different |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i % std::max<std::size_t>(1, b.size())]);
+    different |=
+        static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i % std::max<std::size_t>(1, b.size())]);
   }
   return different == 0;
 }
@@ -261,18 +262,22 @@ struct WebServer::Impl {
     });
     server.Get("/events", [this](const httplib::Request&, httplib::Response& response) { send_events(response); });
     server.Get("/video\\.mjpg", [this](const httplib::Request&, httplib::Response& response) { send_video(response); });
-    server.Post("/control", [this](const httplib::Request& request, httplib::Response& response) {
-      control(request, response);
-    });
+    server.Post("/control",
+                [this](const httplib::Request& request, httplib::Response& response) { control(request, response); });
   }
 
   static std::string httplib_status(int status) {
     switch (status) {
-      case 400: return "the request makes no sense";
-      case 404: return "there is nothing of that name here";
-      case 413: return "the request is too large";
-      case 414: return "the address is too long";
-      default: return fmt::format("status {}", status);
+      case 400:
+        return "the request makes no sense";
+      case 404:
+        return "there is nothing of that name here";
+      case 413:
+        return "the request is too large";
+      case 414:
+        return "the address is too long";
+      default:
+        return fmt::format("status {}", status);
     }
   }
 
@@ -297,10 +302,9 @@ struct WebServer::Impl {
     if (!slot) return refuse_stream(response);
     auto told = std::make_shared<Told>();
     told->cursor = content.feed->newest() > kHistory ? content.feed->newest() - kHistory : 0;
-    response.set_chunked_content_provider("text/event-stream",
-                                          [this, slot, told](std::size_t, httplib::DataSink& sink) {
-                                            return send_event(*told, sink);
-                                          });
+    response.set_chunked_content_provider(
+        "text/event-stream",
+        [this, slot, told](std::size_t, httplib::DataSink& sink) { return send_event(*told, sink); });
   }
 
   /// At most one event. False ends the connection.
@@ -347,10 +351,9 @@ struct WebServer::Impl {
     const std::shared_ptr<void> slot = take(video_streams);
     if (!slot) return refuse_stream(response);
     const auto sent = std::make_shared<std::shared_ptr<const WebPicture>>();
-    response.set_content_provider(std::string("multipart/x-mixed-replace; boundary=") + kBoundary,
-                                  [this, slot, sent](std::size_t, httplib::DataSink& sink) {
-                                    return send_picture(*sent, sink);
-                                  });
+    response.set_content_provider(
+        std::string("multipart/x-mixed-replace; boundary=") + kBoundary,
+        [this, slot, sent](std::size_t, httplib::DataSink& sink) { return send_picture(*sent, sink); });
   }
 
   /// The newest picture there is: a slow viewer misses those between, and nobody waits for it.
@@ -363,9 +366,9 @@ struct WebServer::Impl {
     const bool is_repeated = !next && sent;
     if (next) sent = next;
     if (!sent) return sink.write("\r\n", 2);  // before the first boundary anything may stand
-    const std::string head =
-        fmt::format("--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\nX-Berth-Repeated: {}\r\nX-Berth-Picture: {}\r\n\r\n",
-                    kBoundary, sent->jpeg.size(), is_repeated ? 1 : 0, sent->about);
+    const std::string head = fmt::format(
+        "--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\nX-Berth-Repeated: {}\r\nX-Berth-Picture: {}\r\n\r\n",
+        kBoundary, sent->jpeg.size(), is_repeated ? 1 : 0, sent->about);
     return sink.write(head.data(), head.size()) && sink.write(sent->jpeg.data(), sent->jpeg.size()) &&
            sink.write("\r\n", 2);
   }
@@ -410,9 +413,10 @@ WebServer::WebServer(const WebAddress& address, WebContent content)
     bound.port = -1;
   }
   if (bound.port <= 0) {
-    throw Error(fmt::format("--view {}:{}: cannot be listened on: another program does, or the address is not this "
-                            "machine's; give another port, or 0 for any",
-                            address.host, address.port));
+    throw Error(
+        fmt::format("--view {}:{}: cannot be listened on: another program does, or the address is not this "
+                    "machine's; give another port, or 0 for any",
+                    address.host, address.port));
   }
   impl_->server.widen_queue();
   impl_->thread = std::thread([this] {

@@ -16,8 +16,8 @@ struct WebAddress {
   int port = 8040;
 };
 
-/// "HOST:PORT", "HOST", ":PORT" or "PORT"; "[::1]:8040" for IPv6; port 0 takes any that is free. Throws Error that names
-/// the value and the remedy.
+/// "HOST:PORT", "HOST", ":PORT" or "PORT"; "[::1]:8040" for IPv6; port 0 takes any that is free. Throws Error that
+/// names the value and the remedy.
 WebAddress parse_web_address(const std::string& text);
 
 /// What a server hands out, and what may be asked of it. Everything is called from its threads.
@@ -32,9 +32,9 @@ struct WebContent {
   std::function<void()> end_run;
 };
 
-/// The page and its data over HTTP, one thread a connection and one request each. Threads are few and ordinary, whatever
-/// the stream's are, and give way to it where the processor is short. No file is ever read: what is handed out was built
-/// in.
+/// The page and its data over HTTP, one thread a connection and one request each. Threads are few and ordinary,
+/// whatever the stream's are, and give way to it where the processor is short. No file is ever read: what is handed out
+/// was built in.
 class WebServer {
  public:
   /// Streams of events and of video at once, each; and connections in all. More are refused, not queued.

@@ -27,7 +27,8 @@ Json WebTimes::json() const {
   Json json = Json::array();
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     const LatencyHistogram& times = times_[i];
-    if (times.max() > 0) json.push_back({kNames[i], ms(times.quantile(0.5)), ms(times.quantile(0.99)), ms(times.max())});
+    if (times.max() > 0)
+      json.push_back({kNames[i], ms(times.quantile(0.5)), ms(times.quantile(0.99)), ms(times.max())});
   }
   return json;
 }

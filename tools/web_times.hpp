@@ -16,7 +16,7 @@ class WebTimes {
   Json json() const;
 
  private:
-  static constexpr std::array<const char*, 9> kNames = {"frame",  "wait",  "device", "queue",  "decode",
+  static constexpr std::array<const char*, 9> kNames = {"frame",   "wait",  "device", "queue",  "decode",
                                                         "corners", "discs", "pose",   "latency"};
   void add(const char* name, std::int64_t ns);
 

@@ -38,9 +38,10 @@ std::string read_token(const std::string& path) {
   if (!token.empty() && token.back() == '\r') token.pop_back();
   const bool is_plain = std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c <= '~'; });
   if (token.size() < kShortestToken || token.size() > 256 || !is_plain) {
-    throw Error(fmt::format("--view-token {}: its first line has {} characters; write {} to 256 of printable ASCII without "
-                            "spaces, e.g. by openssl rand -hex 16",
-                            path, token.size(), kShortestToken));
+    throw Error(
+        fmt::format("--view-token {}: its first line has {} characters; write {} to 256 of printable ASCII without "
+                    "spaces, e.g. by openssl rand -hex 16",
+                    path, token.size(), kShortestToken));
   }
   return token;
 }
