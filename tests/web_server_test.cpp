@@ -117,9 +117,8 @@ TEST_F(WebServerTest, HandsOutThePageAndWhatItNeeds) {
 }
 
 TEST_F(WebServerTest, HasNoFiles) {
-  for (const char* path :
-       {"/../../etc/passwd", "/..%2f..%2fetc%2fpasswd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd",
-        "/view.css/../../../etc/passwd", "/view.css%00", "/viewXcss", "/etc/passwd", "/three.min.js/"}) {
+  for (const char* path : {"/../../etc/passwd", "/..%2f..%2fetc%2fpasswd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd",
+                           "/view.css/../../../etc/passwd", "/view.css%00", "/viewXcss", "/etc/passwd", "/three.js/"}) {
     const std::string answer = answer_to_get(port, path);
     EXPECT_THAT(answer, StartsWith("HTTP/1.1 404")) << path;
     EXPECT_THAT(answer, Not(HasSubstr("root:"))) << path;

@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <regex>
 #include <sstream>
+#include <thread>
 
 #include "berth/pose_filter.hpp"
 #include "sim/corpus.hpp"
@@ -316,6 +319,55 @@ TEST(WebOptions, ServeTheRunTheyAreGivenTo) {
       {"run", "--source", "sim:" + kScenario, "--max-frames", "2", "--backend", "simd", "--view", "127.0.0.1:0"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_GT(port_of(run.out), 0) << run.out;
+}
+
+/// The document's commands, word by word.
+std::vector<std::vector<std::string>> commands_of(const std::string& document) {
+  std::vector<std::vector<std::string>> commands;
+  std::istringstream lines(text_of(std::string(BERTH_SOURCE_DIR) + "/docs/" + document));
+  bool is_command = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("```", 0) == 0) {
+      is_command = line == "```sh";
+    } else if (is_command) {
+      std::istringstream words(line);
+      commands.emplace_back(std::istream_iterator<std::string>(words), std::istream_iterator<std::string>());
+    }
+  }
+  return commands;
+}
+
+TEST(LiveViewDocument, HasCommandsThatRun) {
+  const ScratchFolder folder;
+  int runs = 0;
+  for (const std::vector<std::string>& words : commands_of("live-view.md")) {
+    ASSERT_FALSE(words.empty());
+    if (words[0] == "openssl") {
+      std::string line;
+      for (const std::string& word : words) line += word + " ";
+      EXPECT_EQ(std::system(("cd " + folder.path() + " && " + line).c_str()), 0) << line;
+      continue;
+    }
+    ASSERT_EQ(words[0], "berth");
+    // As it stands, but short, at a port that is free, and in folders of the test's own.
+    std::vector<std::string> arguments;
+    for (std::size_t i = 1; i < words.size(); ++i) {
+      std::string word = words[i];
+      const std::string& before = words[i - 1];
+      if (word.rfind("sim:", 0) == 0) word = "sim:" + std::string(BERTH_SOURCE_DIR) + "/" + word.substr(4);
+      if (before == "--minutes") word = "0.002";
+      if (before == "--report" || before == "--view-token") word = folder / word;
+      if (before == "--view" && word.rfind("--", 0) != 0) word = word.substr(0, word.find(':')) + ":0";
+      arguments.push_back(word);
+      const bool is_bare = word == "--view" && (i + 1 == words.size() || words[i + 1].rfind("--", 0) == 0);
+      if (is_bare) arguments.emplace_back("127.0.0.1:0");
+    }
+    arguments.insert(arguments.end(), {"--max-frames", "3"});
+    const test::CommandRun run = test::run_berth(arguments);
+    EXPECT_EQ(run.exit_code, 0) << words.back() << ": " << run.err;
+    ++runs;
+  }
+  EXPECT_GE(runs, 4);
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ class WebReport final : public FrameObserver {
   void finish(std::ostream& people) override {
     std::string page(web_asset("report.html"));
     std::string scripts;
-    for (const char* name : {"three.min.js", "lines.js", "format.js", "plot.js", "scene.js", "report.js"}) {
+    for (const char* name : {"three.js", "format.js", "plot.js", "scene.js", "report.js"}) {
       scripts += fmt::format("<script>\n{}\n</script>\n", web_asset(name));
     }
     // The data first: nothing that stands in them is looked through for marks.

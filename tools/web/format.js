@@ -46,7 +46,11 @@ window.berth = window.berth || {};
   const count = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, ',');
 
   /// A colour of the style sheet, in the theme that is shown.
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
+  const colours = new Map();
+  const colour = (name) => {
+    if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim());
+    return colours.get(name);
+  };
 
   /// A canvas as large as the screen has pixels for it; its context draws in CSS pixels.
   function crisp(canvas) {
@@ -66,17 +70,21 @@ window.berth = window.berth || {};
   function theme(select, changed) {
     let stored = '';
     try { stored = localStorage.getItem('berth-theme') || ''; } catch (e) { /* not allowed to remember */ }
+    const repaint = () => {
+      colours.clear();
+      changed();
+    };
     const apply = () => {
       if (select.value) document.documentElement.dataset.theme = select.value;
       else delete document.documentElement.dataset.theme;
-      changed();
+      repaint();
     };
     select.value = stored;
     select.addEventListener('change', () => {
       try { localStorage.setItem('berth-theme', select.value); } catch (e) { /* likewise */ }
       apply();
     });
-    window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', changed);
+    window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
     apply();
   }
 

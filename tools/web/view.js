@@ -15,7 +15,7 @@
   };
 
   let about = {}, state = null, objects = [], tracks = [], chosen = -1, page = 'connecting', connected = false, connectedOnce = false;
-  let spoken = 0, drawn = 0;
+  let spoken = 0, drawn = 0, listed = 0;
 
   const video = new berth.Video($('video'), 'video.mjpg');
   const plots = berth.axes.map((axis, i) => new berth.Plot($('plots'), axis, i));
@@ -155,7 +155,7 @@
     say('closing-name', speed !== null && speed < 0 ? 'Drawing away' : 'Closing');
     say('closing', speed === null ? '—' : berth.fixed(Math.abs(speed), Math.abs(speed) < 100 ? 1 : 0));
     say('closing-sub', speed === null ? (sample ? 'takes half a second of poses' : '\u00a0') :
-      '± ' + berth.fixed((sample.closingDeviation || 0) * 1000, 1) + ' mm/s' + (speed > 1 && sample.range > 0 ? ', ' + berth.duration(sample.range / (speed / 1000)) + ' left' : ''));
+      '± ' + berth.fixed((sample.closingDeviation || 0) * 1000, 1) + ' mm/s' + (speed > 1 && speed > 2000 * (sample.closingDeviation || 0) ? ', ' + berth.duration(sample.range / (speed / 1000)) + ' left' : ''));
     showPose(sample, name);
     const old = page === 'lost' ? stream.silence() : age();
     const isSlow = old !== null && old >= 1;
@@ -284,8 +284,10 @@
     if (berth.now() - drawn < 0.09) return;
     drawn = berth.now();
     showPlots();
-    showCards();
     scene.draw();
+    if (berth.now() - listed < 0.4) return;
+    listed = berth.now();
+    showCards();
   }
 
   // ---- what people do ----
