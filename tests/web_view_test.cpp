@@ -282,13 +282,13 @@ TEST(WebReport, KeepsHalfOfWhatIsTooMuch) {
   const DetectorConfig detector = config();
   const std::string backend = "simd";
   report->begin({320, 240, detector, backend});
-  for (int i = 0; i < 30'000; ++i) report->observe(Frame(2 - i * 1e-5, i / 300.0).observed());
+  for (int i = 0; i < 26'000; ++i) report->observe(Frame(2 - i * 1e-5, i / 300.0).observed());
   std::ostringstream said;
   report->finish(said);
   const Json data = data_of(text_of(options.report));
-  EXPECT_EQ(data["frames"], 30'000);
+  EXPECT_EQ(data["frames"], 26'000);
   EXPECT_EQ(data["every"], 2);
-  EXPECT_EQ(data["samples"].size(), 15'000u);
+  EXPECT_EQ(data["samples"].size(), 13'000u);
   EXPECT_EQ(data["samples"][1][0], 0.0067);
   EXPECT_EQ(data["about"]["source"], options.source);
 }

@@ -42,6 +42,8 @@ FREEZE = """
       });
     }
   };
+  const decode = createImageBitmap;
+  window.createImageBitmap = (bytes) => (window.frozen ? new Promise(() => {}) : decode(bytes));
 """
 
 
@@ -55,10 +57,10 @@ class Run:
     """`berth run`, watched at a port; played round until it is stopped."""
 
     def __init__(self, port, *more):
-        scenario = pathlib.Path(ARGUMENTS.source) / "scenarios/approach.toml"
-        command = [ARGUMENTS.berth, "run", "--source", f"sim:{scenario}", "--max-frames", str(ARGUMENTS.frames)]
+        command = [ARGUMENTS.berth, "run", "--source", "sim:scenarios/approach.toml", "--max-frames", str(ARGUMENTS.frames)]
         command += ["--backend", "simd", "--fps", "12", "--minutes", "10", "--view", f"127.0.0.1:{port}", *more]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.process = subprocess.Popen(command, cwd=ARGUMENTS.source, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                        text=True)
         self.said = self.process.stdout.readline()
 
     def send(self, which):
@@ -110,9 +112,9 @@ class ViewPage(unittest.TestCase):
     def text(self, name):
         return self.page.locator("#" + name).inner_text()
 
-    def picture(self, name):
+    def picture(self, name, full=False):
         if ARGUMENTS.screenshots:
-            self.page.screenshot(path=str(pathlib.Path(ARGUMENTS.screenshots) / name))
+            self.page.screenshot(path=str(pathlib.Path(ARGUMENTS.screenshots) / name), full_page=full)
 
     # The tests run in the order of their names, on one page: a browser takes long to start.
 
@@ -123,7 +125,7 @@ class ViewPage(unittest.TestCase):
         self.until("() => document.querySelectorAll('#times tr').length > 3")
         if ARGUMENTS.screenshots:
             self.page.wait_for_timeout(9000)
-            self.picture("live-view.png")
+            self.picture("live-view.png", full=True)
         for name in ["range", "closing", "pose", "age", "video", "scene", "mode", "search", "why", "backend", "health"]:
             self.assertTrue(self.page.locator("#" + name).is_visible(), name)
         self.assertEqual(self.page.locator("#plots canvas").count(), 6)
@@ -250,10 +252,10 @@ class ViewPage(unittest.TestCase):
     def test_9_reports_a_run(self):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "run.html"
-            scenario = pathlib.Path(ARGUMENTS.source) / "scenarios/approach.toml"
             frames = 140 if ARGUMENTS.screenshots else 6
-            subprocess.run([ARGUMENTS.berth, "run", "--source", f"sim:{scenario}", "--max-frames", str(frames),
-                            "--backend", "simd", "--report", str(path)], check=True, stdout=subprocess.DEVNULL)
+            subprocess.run([ARGUMENTS.berth, "run", "--source", "sim:scenarios/approach.toml", "--max-frames", str(frames),
+                            "--backend", "simd", "--report", str(path)], cwd=ARGUMENTS.source, check=True,
+                           stdout=subprocess.DEVNULL)
             page = self.context.new_page()
             complaints, requests = [], []
             page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
@@ -272,7 +274,7 @@ class ViewPage(unittest.TestCase):
             page.wait_for_function("(old) => document.getElementById('moment').textContent !== old", arg=before)
             page.keyboard.press("End")
             if ARGUMENTS.screenshots:
-                page.screenshot(path=str(pathlib.Path(ARGUMENTS.screenshots) / "report.png"))
+                page.screenshot(path=str(pathlib.Path(ARGUMENTS.screenshots) / "report.png"), full_page=True)
             self.assertEqual([url for url in requests if not url.startswith(("file:", "data:", "blob:"))], [])
             self.assertEqual(complaints, [])
             page.close()
@@ -280,7 +282,7 @@ class ViewPage(unittest.TestCase):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("berth")
+    parser.add_argument("berth", type=lambda path: str(pathlib.Path(path).resolve()))
     parser.add_argument("source")
     parser.add_argument("chromium")
     parser.add_argument("--screenshots")

@@ -55,7 +55,7 @@
     }
 
     line(name, width) {
-      const material = new THREE.LineMaterial({linewidth: width, transparent: true});
+      const material = new THREE.LineMaterial({linewidth: width});
       const line = new THREE.LineSegments2(new THREE.LineSegmentsGeometry(), material);
       line.frustumCulled = false;
       line.visible = false;
@@ -89,15 +89,14 @@
         this.face.visible = false;
         this.scene.add(this.face);
       }
-      const paint = (name, colour, opacity = 1) => {
-        this.lines[name].material.color.set(colour);
-        this.lines[name].material.opacity = opacity;
-      };
+      // Wide lines cannot be seen through: fainter ones are nearer the ground's colour.
+      const ground = new THREE.Color(berth.colour('stage'));
+      const paint = (name, colour, strength = 1) => this.lines[name].material.color.copy(ground).lerp(new THREE.Color(colour), strength);
       const soft = berth.colour('soft'), first = berth.colour('first');
-      paint('grid', soft, 0.22);
+      paint('grid', soft, 0.3);
       paint('frustum', soft, 0.9);
-      paint('shadow', soft, 0.55);
-      paint('drop', soft, 0.55);
+      paint('shadow', soft, 0.6);
+      paint('drop', soft, 0.8);
       paint('way', berth.colour('data'));
       paint('square', first);
       paint('first', first);
@@ -196,27 +195,28 @@
       }
       const box = this.bounds();
       this.build(box);
-      this.aim(this.bounds(true));
+      this.aim(box);
       this.renderer.render(this.scene, this.camera);
       this.parent.dataset.seen = [this.view, this.turn.around.toFixed(2), this.turn.up.toFixed(2), this.turn.zoom.toFixed(2)].join(' ');
       this.label(width, height);
     }
 
-    /// Of the way, the camera and the square; with the ground beneath them, all that is drawn.
-    bounds(isAll) {
+    /// Of the way, the camera and the square.
+    bounds() {
       const box = new THREE.Box3();
       box.expandByPoint(new THREE.Vector3(0, 0, 0));
       this.way.forEach((s) => box.expandByPoint(place(s.value)));
       if (this.live) this.corners(this.live).forEach((p) => box.expandByPoint(place(p)));
       if (this.way.length === 0) box.expandByPoint(new THREE.Vector3(0, 0, -0.5));
-      if (isAll) {
-        const far = this.pyramidDepth(box);
-        box.min.y = Math.min(-this.ground, -0.4 * far);
-        box.max.y = Math.max(box.max.y, 0.4 * far);
-        box.min.x = Math.min(box.min.x, -0.5 * far);
-        box.max.x = Math.max(box.max.x, 0.5 * far);
-      }
       return box;
+    }
+
+    /// Points that have to be in sight.
+    outline(box) {
+      const points = [...this.ground, ...this.frustum].map(place), step = Math.ceil(this.way.length / 60);
+      for (let i = 0; i < this.way.length; i += step) points.push(place(this.way[i].value));
+      for (const x of [box.min.x, box.max.x]) points.push(new THREE.Vector3(x, box.max.y, box.max.z));
+      return points;
     }
 
     corners(sample) {
@@ -226,7 +226,6 @@
 
     build(box) {
       const floor = -(box.min.y - 0.1 * Math.max(0.1, box.max.z - box.min.z));  // y down again
-      this.ground = floor;
       const pairs = [], shadow = [];
       for (let i = 1; i < this.way.length; ++i) {
         const a = this.way[i - 1], b = this.way[i];
@@ -263,6 +262,7 @@
       for (let x = left; x <= right + 1e-9; x += step) pairs.push([x, floor, 0], [x, floor, far]);
       for (let z = 0; z <= far + 1e-9; z += step) pairs.push([left, floor, z], [right, floor, z]);
       this.set(this.lines.grid, pairs);
+      this.ground = [[left, floor, 0], [right, floor, 0], [right, floor, far], [left, floor, far]];
       this.legend.textContent = 'squares of ' + berth.length(step);
     }
 
@@ -276,6 +276,7 @@
       const c = [corner(0, 0), corner(0, p.height), corner(p.width, p.height), corner(p.width, 0)], o = [0, 0, 0];
       const pairs = [];
       c.forEach((q, i) => pairs.push(o, q, q, c[(i + 1) % 4]));
+      this.frustum = c;
       this.set(this.lines.frustum, pairs);
     }
 
@@ -297,8 +298,7 @@
         this.camera.lookAt(at);
         this.camera.updateMatrixWorld();
       };
-      const points = [];
-      for (const x of [box.min.x, box.max.x]) for (const y of [box.min.y, box.max.y]) for (const z of [box.min.z, box.max.z]) points.push(new THREE.Vector3(x, y, z));
+      const points = this.outline(box);
       for (let i = 0; i < 4; ++i) {
         stand(centre);
         const seen = points.map((p) => p.clone().project(this.camera));
@@ -306,7 +306,7 @@
         const middle = new THREE.Vector3((Math.min(...xs) + Math.max(...xs)) / 2, (Math.min(...ys) + Math.max(...ys)) / 2, centre.clone().project(this.camera).z);
         const half = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)) / 2;
         centre.copy(middle.unproject(this.camera));
-        distance *= Math.max(0.2, half / 0.82);
+        distance *= Math.max(0.2, half / 0.9);
       }
       const kept = this.kept;
       if (!kept || kept.view !== this.view || distance > kept.distance || distance < 0.6 * kept.distance ||

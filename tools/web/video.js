@@ -95,7 +95,7 @@
       c.filter = 'none';
       if (!isLive) {
         this.hatch(c, width, height);
-        return this.say(c, width, height, age === null ? 'not live' : 'this picture is ' + berth.duration(age) + ' old', true);
+        return this.say(c, width, height, age === null || age < 1 ? 'not live' : 'this picture is ' + berth.duration(age) + ' old', true);
       }
       if (!this.overlay) return;
       // Pixel centres are at integers, in the camera's image, which the picture may be a smaller one of.
@@ -129,19 +129,18 @@
         });
       }
       if (corners.length === 4) this.corners(c, corners);
-      const name = object.name;
-      if (!name) return;
       const all = corners.length ? corners : (object.axes || []).filter(Boolean).map(at);
-      if (!all.length) return;
+      const wide = Math.max(...all.map((p) => p[0])) - Math.min(...all.map((p) => p[0]));
+      if (!all.length || !(wide > 30)) return;  // names would cover each other
       const x = all.reduce((sum, p) => sum + p[0], 0) / all.length, y = Math.max(...all.map((p) => p[1]));
-      this.word(c, name, [x, y + 24], kColours.text, 12);
+      this.word(c, object.name, [x, y + 24], kColours.text, 12);
     }
 
     corners(c, corners) {
       const x = corners.reduce((sum, p) => sum + p[0], 0) / 4, y = corners.reduce((sum, p) => sum + p[1], 0) / 4;
       this.dot(c, corners[0], kColours.first, 4.5);
       const reach = Math.max(...corners.map((p) => Math.hypot(p[0] - x, p[1] - y)));
-      if (reach < 14) return;  // numbers would cover it
+      if (reach < 20) return;  // numbers would cover it
       corners.forEach((p, i) => {
         const d = Math.hypot(p[0] - x, p[1] - y) || 1;
         this.word(c, String(i + 1), [p[0] + (p[0] - x) / d * 12, p[1] + (p[1] - y) / d * 12], i === 0 ? kColours.first : kColours.edge, i === 0 ? 14 : 11);
