@@ -1,12 +1,14 @@
 // berth run: markers in a stream of frames.
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
 #include "ros_options.hpp"
+#include "service_notify.hpp"
 #include "stream.hpp"
 #include "systematic_show.hpp"
 #include "web_options.hpp"
@@ -125,6 +127,9 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
     options->web.is_filtered = options->stream.filter;
     add_web_observers(options->web, options->stream.log == "-" ? console.err() : console.out(),
                       options->stream.observers);
+    if (std::unique_ptr<FrameObserver> notify = service_notify()) {
+      options->stream.observers.push_back(std::move(notify));
+    }
     exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;
   });
 }
