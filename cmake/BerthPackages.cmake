@@ -43,7 +43,8 @@ install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright DESTINATION ${CMAKE_INST
         COMPONENT runtime)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libberth-dev COMPONENT dev)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth COMPONENT tools)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth COMPONENT tools)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth COMPONENT tools
+        PATTERN Doxyfile EXCLUDE)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/berth.service DESTINATION lib/systemd/system COMPONENT tools)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/berth.default DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth/examples
         COMPONENT tools)

@@ -206,6 +206,7 @@ void bind_results(nb::module_& m) {
 
 NB_MODULE(_berth, m) {
   m.doc() = "Docking vision: markers and their poses, with the same bits on every machine.";
+  // NOLINTNEXTLINE(bugprone-throw-keyword-missing,bugprone-unused-raii): it is made to be known to Python
   nb::exception<Error>(m, "Error", PyExc_RuntimeError);
   m.def("backend_names", &backend_names, "In order of preference.");
   m.def("family_names", &family_names);
