@@ -282,7 +282,11 @@ TEST(WebReport, KeepsHalfOfWhatIsTooMuch) {
   const DetectorConfig detector = config();
   const std::string backend = "simd";
   report->begin({320, 240, detector, backend});
-  for (int i = 0; i < 26'000; ++i) report->observe(Frame(2 - i * 1e-5, i / 300.0).observed());
+  Frame frame;
+  for (int i = 0; i < 26'000; ++i) {
+    frame.result.stamp.mid_exposure_ns = i * 3'333'333LL;
+    report->observe(frame.observed());
+  }
   std::ostringstream said;
   report->finish(said);
   const Json data = data_of(text_of(options.report));

@@ -37,7 +37,13 @@ std::string date_now() {
 /// JSON for the inside of a script element, which no text in it may end.
 std::string embedded(const Json& json) {
   std::string text;
-  for (const char c : to_line(json)) text += c == '<' ? std::string("\\u003c") : std::string(1, c);
+  for (const char c : to_line(json)) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
   return text;
 }
 

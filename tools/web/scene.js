@@ -310,7 +310,7 @@
       }
       const kept = this.kept;
       if (!kept || kept.view !== this.view || distance > kept.distance || distance < 0.6 * kept.distance ||
-          centre.distanceTo(kept.centre) > 0.12 * distance || kept.turn !== around + '/' + up) {
+          centre.distanceTo(kept.centre) > 0.04 * distance || kept.turn !== around + '/' + up) {
         this.kept = {view: this.view, turn: around + '/' + up, distance: distance * 1.04, centre};
       }
       distance = this.kept.distance * this.turn.zoom;

@@ -85,8 +85,10 @@
 
   // ---- what is live ----
 
-  const gap = () => Math.max(0.3, 3 / Math.max(0.1, state.fps || 1));
-  const limit = () => Math.max(0.5, Math.min(3, 4 / Math.max(0.1, state.fps || 1)));
+  /// s from one frame to the next; in the first second, while that is not known, a fast camera's.
+  const period = () => 1 / Math.max(0.1, state.fps || 10);
+  const gap = () => Math.max(0.3, 3 * period());
+  const limit = () => Math.max(0.5, Math.min(3, 4 * period()));
   const age = () => (state && state.frames ? Math.max(0, stream.now() - state.captured) : null);
 
   function judge() {
@@ -99,7 +101,7 @@
   /// The object's newest sample, where the newest frame shows it; or null.
   function seen(at) {
     const track = tracks[at] || [], last = track[track.length - 1];
-    return last && state.finished - last.time <= Math.max(0.25, 2.5 / Math.max(0.1, state.fps || 1)) ? last : null;
+    return last && state.finished - last.time <= Math.max(0.25, 2.5 * period()) ? last : null;
   }
   const last = (at) => (tracks[at] && tracks[at].length ? tracks[at][tracks[at].length - 1] : null);
 
