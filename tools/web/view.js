@@ -9,7 +9,7 @@
   const kRankOf = {bundle: 0, target: 1, marker: 2};
 
   const kAlarms = {
-    stale: ['NO LIVE DATA', (age) => 'The newest frame is ' + berth.duration(age) + ' old. What stood here has been taken away.'],
+    stale: ['NO LIVE DATA', (age) => 'The newest frame is ' + berth.duration(age) + ' old. No value is shown until frames come again.'],
     lost: ['NO CONNECTION', (age) => 'Nothing has come from Berth for ' + berth.duration(age) + '. Trying again by itself.'],
     ended: ['THE RUN HAS ENDED', () => 'What is shown is its end; nothing here is live.'],
   };
