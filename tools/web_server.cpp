@@ -1,7 +1,6 @@
 // The only file that knows the HTTP library.
 #include "web_server.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <httplib.h>
 #include <sys/resource.h>
@@ -9,7 +8,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstring>
 #include <deque>
 #include <thread>
 
@@ -137,25 +135,6 @@ class Listener final : public httplib::Server {
   }
 };
 
-/// Names by which this machine may be asked for. Others are a stranger's page that made its own name point here.
-bool is_host_known(std::string host) {
-  if (!host.empty() && host.front() == '[') {
-    host = host.substr(1, host.find(']') - 1);
-  } else {
-    host = host.substr(0, host.find(':'));
-  }
-  std::array<unsigned char, sizeof(in6_addr)> binary = {};
-  if (inet_pton(AF_INET, host.c_str(), binary.data()) == 1 || inet_pton(AF_INET6, host.c_str(), binary.data()) == 1) {
-    return true;
-  }
-  std::transform(host.begin(), host.end(), host.begin(), [](unsigned char c) { return std::tolower(c); });
-  std::array<char, 256> name = {};
-  gethostname(name.data(), name.size() - 1);
-  std::string own = name.data();
-  std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return std::tolower(c); });
-  return host == "localhost" || (!own.empty() && (host == own || host == own + ".local"));
-}
-
 /// In a time that does not tell how much of it is right.
 bool is_same(const std::string& a, const std::string& b) {
   unsigned different = a.size() == b.size() ? 0 : 1;
@@ -176,35 +155,6 @@ std::string event(const char* name, const Json& data) {
 }
 
 }  // namespace
-
-WebAddress parse_web_address(const std::string& text) {
-  WebAddress address;
-  const auto complain = [&] {
-    return Error("--view " + text + ": give ADDRESS:PORT, e.g. 127.0.0.1:8040, or 0.0.0.0:8040 for every network");
-  };
-  if (text.empty()) return address;
-  std::string host = text, port;
-  const std::size_t bracket = text.rfind(']'), colon = text.rfind(':');
-  if (text.front() == '[') {
-    if (bracket == std::string::npos || (bracket + 1 < text.size() && colon != bracket + 1)) throw complain();
-    host = text.substr(1, bracket - 1);
-    if (bracket + 1 < text.size()) port = text.substr(bracket + 2);
-  } else if (colon != std::string::npos) {
-    host = text.substr(0, colon);
-    port = text.substr(colon + 1);
-    if (port.empty()) throw complain();
-  } else if (text.find_first_not_of("0123456789") == std::string::npos) {
-    host.clear();
-    port = text;
-  }
-  if (!host.empty()) address.host = host;
-  if (!port.empty()) {
-    if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos) throw complain();
-    address.port = std::stoi(port);
-  }
-  if (address.port > 65535 || address.host.find_first_of(" /[]") != std::string::npos) throw complain();
-  return address;
-}
 
 struct WebServer::Impl {
   Impl(const WebAddress& address_asked, WebContent content_given)
@@ -237,11 +187,11 @@ struct WebServer::Impl {
          {"Referrer-Policy", "no-referrer"},
          {"X-Content-Type-Options", "nosniff"}});
     server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
-      if (is_host_known(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
+      if (is_own_name(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;
       answer(response, 421, "this page is served by its address or this machine's name only; open it by one of those");
       return httplib::Server::HandlerResponse::Handled;
     });
-    server.set_exception_handler([](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
+    server.set_exception_handler([](const httplib::Request&, httplib::Response& response, const std::exception_ptr&) {
       answer(response, 500, "this request failed");
     });
     server.set_error_handler([](const httplib::Request&, httplib::Response& response) {

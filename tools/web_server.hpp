@@ -5,20 +5,11 @@
 #include <memory>
 #include <string>
 
+#include "web_address.hpp"
 #include "web_feed.hpp"
 #include "web_messages.hpp"
 
 namespace berth::cli {
-
-/// Where a page is served.
-struct WebAddress {
-  std::string host = "127.0.0.1";
-  int port = 8040;
-};
-
-/// "HOST:PORT", "HOST", ":PORT" or "PORT"; "[::1]:8040" for IPv6; port 0 takes any that is free. Throws Error that
-/// names the value and the remedy.
-WebAddress parse_web_address(const std::string& text);
 
 /// What a server hands out, and what may be asked of it. Everything is called from its threads.
 struct WebContent {
