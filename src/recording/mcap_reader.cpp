@@ -1,0 +1,113 @@
+#include "recording/mcap_reader.hpp"
+
+namespace berth::mcap {
+namespace {
+
+constexpr std::size_t kMostAttachment = std::size_t{16} << 20;
+
+template <class Named>
+const Named* find_named(const std::vector<Named>& all, const std::string& name) {
+  for (const Named& one : all) {
+    if (one.name == name) return &one;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Reader::Reader(const std::string& path) : scan_(path) { ahead_ = advance(); }
+
+const Schema* Reader::schema_of_channel(u16 channel) const {
+  const auto known = channels_.find(channel);
+  if (known == channels_.end()) return nullptr;
+  const auto schema = schemas_.find(known->second.schema);
+  return schema == schemas_.end() ? nullptr : &schema->second;
+}
+
+const Metadata* Reader::find_metadata(const std::string& name) const { return find_named(metadata_, name); }
+const Attachment* Reader::find_attachment(const std::string& name) const { return find_named(attachments_, name); }
+
+void Reader::take_side_record() {
+  const Bytes& content = scan_.content();
+  FieldReader fields(content.data(), content.size());
+  bool whole = true;
+  if (scan_.op() == Op::schema) {
+    Schema schema = schema_of(fields);
+    whole = fields.ok();
+    if (whole) schemas_.emplace(schema.id, std::move(schema));
+  } else if (scan_.op() == Op::channel) {
+    Channel channel = channel_of(fields);
+    whole = fields.ok();
+    if (whole) channels_.emplace(channel.id, std::move(channel));
+  } else if (scan_.op() == Op::metadata) {
+    whole = read_metadata(content, metadata_.emplace_back());
+    if (!whole) metadata_.pop_back();
+  } else if (scan_.op() == Op::attachment && content.size() <= kMostAttachment) {
+    whole = read_attachment(content, attachments_.emplace_back());
+    if (!whole) attachments_.pop_back();
+  }
+  if (!whole) problems_.add("the record at byte " + std::to_string(scan_.offset()) + " is damaged");
+}
+
+bool Reader::advance() {
+  records_.clear();
+  at_ = 0;
+  while (scan_.next(problems_)) {
+    loose_ = scan_.op() == Op::message;
+    if (loose_) return true;
+    if (scan_.op() != Op::chunk) {
+      take_side_record();
+      continue;
+    }
+    Chunk chunk;
+    const std::string wrong = open_chunk(scan_.content(), codec_, chunk, records_);
+    if (wrong.empty()) return true;
+    problems_.add("the chunk at byte " + std::to_string(scan_.offset()) + " is passed over: " + wrong);
+    records_.clear();
+  }
+  return false;
+}
+
+const Message* Reader::message_of(const u8* content, std::size_t size) {
+  FieldReader fields(content, size);
+  message_.channel = fields.number<u16>();
+  message_.sequence = fields.number<u32>();
+  message_.log_time = fields.number<u64>();
+  message_.publish_time = fields.number<u64>();
+  message_.data = fields.rest();
+  message_.size = fields.left();
+  return fields.ok() ? &message_ : nullptr;
+}
+
+const Message* Reader::next() {
+  for (;; ahead_ = advance()) {
+    if (!ahead_) return nullptr;
+    if (loose_) {
+      if (at_++ > 0) continue;
+      const Bytes& content = scan_.content();
+      if (const Message* message = message_of(content.data(), content.size())) return message;
+      continue;
+    }
+    while (records_.size() - at_ >= kRecordHead) {
+      FieldReader fields(records_.data() + at_, records_.size() - at_);
+      const Op op = static_cast<Op>(fields.number<u8>());
+      const u64 length = fields.number<u64>();
+      const u8* const content = fields.take(length);
+      if (content == nullptr) break;
+      at_ = records_.size() - fields.left();
+      FieldReader inner(content, static_cast<std::size_t>(length));
+      if (op == Op::message) {
+        if (const Message* message = message_of(content, static_cast<std::size_t>(length))) return message;
+      } else if (op == Op::schema) {
+        Schema schema = schema_of(inner);
+        if (inner.ok()) schemas_.emplace(schema.id, std::move(schema));
+      } else if (op == Op::channel) {
+        Channel channel = channel_of(inner);
+        if (inner.ok()) channels_.emplace(channel.id, std::move(channel));
+      }
+    }
+    if (at_ < records_.size()) problems_.add("the chunk at byte " + std::to_string(scan_.offset()) + " ends in damage");
+  }
+}
+
+}  // namespace berth::mcap
