@@ -189,7 +189,9 @@ void add_calibrate(CLI::App& app, Console& console, int& exit_code) {
   CLI::App* command = app.add_subcommand("calibrate", "A camera's lens from images of a board, as camera_info YAML");
   const auto options = std::make_shared<CalibrateCommand>();
   command->add_option("IMAGE", options->images, "PNG, JPEG or PNM files, or folders of them");
-  command->add_option("--source", options->source, "sim:FILE, dir:DIR, video:FILE or v4l2:CAMERA instead of images")
+  command
+      ->add_option("--source", options->source,
+                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE or v4l2:CAMERA instead of images")
       ->type_name("SOURCE");
   command->add_option("--board", options->kind, "aprilgrid, chessboard or charuco")
       ->transform(CLI::CheckedTransformer(std::map<std::string, BoardKind>{

@@ -1,5 +1,7 @@
 // berth run: markers in a stream of frames.
 #include <algorithm>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -7,6 +9,8 @@
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
+#include "recorder.hpp"
+#include "recording_setup.hpp"
 #include "ros_options.hpp"
 #include "service_notify.hpp"
 #include "stream.hpp"
@@ -28,6 +32,8 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source v4l2:video0,width=640,height=480,fps=120 --camera cam.yaml --size 0.08 --filter
   berth run --source v4l2:video0,width=640,height=480,fps=120 --stream --track    at its own pace
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
+  berth run --source sim:scenarios/approach.toml --record approach.mcap    for berth replay, Foxglove, rosbag2
+  berth run --source mcap:approach.mcap --corners photometric              a recording, searched otherwise
   berth run --source sim:scenarios/approach.toml --fps 300 --minutes 30    as a camera would: latency, drops
   berth run --source v4l2:video0 --camera cam.yaml --size 0.08 --ros --ros-namespace robot1    to ROS 2 nodes
   berth run --source sim:scenarios/approach.toml --fps 30 --minutes 5 --filter --view    watched in a browser
@@ -35,21 +41,50 @@ constexpr const char* kExamples = R"(Examples:
 
 Ctrl-C ends the stream cleanly, with its summary.)";
 
+void add_record_options(CLI::App& command, RecordOptions& record) {
+  CLI::Option* file = command
+                          .add_option("--record", record.file,
+                                      "record frames, poses, detections, health and digests in an MCAP file "
+                                      "(docs/recording.md)")
+                          ->type_name("FILE");
+  command
+      .add_option("--record-images", record.pictures,
+                  "how frames are kept: raw, png (a quarter smaller, some ms a frame), or none (no replay) [raw]")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, RecordPictures>{
+          {"raw", RecordPictures::raw}, {"png", RecordPictures::png}, {"none", RecordPictures::none}}))
+      ->type_name("HOW")
+      ->needs(file);
+  command
+      .add_option("--record-queue", record.queue,
+                  "frames that may wait for the disk; those beyond are dropped and counted, where frames do not wait")
+      ->type_name("N")
+      ->needs(file)
+      ->capture_default_str();
+}
+
+/// Whether a source is the file that it is to be recorded in.
+bool is_same_file(const std::string& source, const std::string& file) {
+  std::error_code ignored;
+  const std::string path = source.substr(source.find(':') + 1);
+  return std::filesystem::equivalent(path, file, ignored) || std::filesystem::equivalent(source, file, ignored);
+}
+
 }  // namespace
 
 void add_run(CLI::App& app, Console& console, int& exit_code) {
   struct Options {
     std::string source;
     StreamOptions stream;
+    RecordOptions record;
     RosOptions ros;
     WebOptions web;
   };
   CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image, video or camera");
   const auto options = std::make_shared<Options>();
   command
-      ->add_option(
-          "--source", options->source,
-          "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, v4l2:CAMERA (docs/cameras.md), or a path that tells")
+      ->add_option("--source", options->source,
+                   "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, mcap:FILE (a recording), v4l2:CAMERA "
+                   "(docs/cameras.md), or a path that tells")
       ->type_name("SOURCE")
       ->required();
   command->add_option("--json", options->stream.log, "log: one JSON line a frame; - for standard output")
@@ -70,6 +105,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str();
+  add_record_options(*command, options->record);
   add_report_option(*command, options->web);
   add_view_options(*command, options->web);
   PaceOptions& pace = options->stream.pace;
@@ -121,8 +157,10 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
           "--track searches in windows, which show markers alone; --target needs whole frames: leave one of the two "
           "out");
     }
+    if (!options->record.file.empty() && is_same_file(options->source, options->record.file)) {
+      throw Error(options->record.file + ": it is the source itself; record in another file");
+    }
     if (options->ros.on) options->stream.observers.push_back(make_ros_publisher(make_ros_plan(options->ros)));
-    const std::unique_ptr<Source> source = open_source(options->source);
     options->web.source = options->source;
     options->web.is_filtered = options->stream.filter;
     add_web_observers(options->web, options->stream.log == "-" ? console.err() : console.out(),
@@ -130,7 +168,14 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
     if (std::unique_ptr<FrameObserver> notify = service_notify()) {
       options->stream.observers.push_back(std::move(notify));
     }
-    exit_code = run_stream(*source, options->stream, console).differing == 0 ? kOk : kNoResult;
+    // Its own observers, which end before the source does.
+    StreamOptions recorded = options->stream;
+    if (!options->record.file.empty()) {
+      const bool paced = is_camera || given.fps != 0;
+      recorded.observers.push_back(std::make_shared<Recorder>(options->record, describe_run(recorded, options->source),
+                                                              paced, source->camera(), console));
+    }
+    exit_code = run_stream(*source, recorded, console).differing == 0 ? kOk : kNoResult;
   });
 }
 

@@ -13,6 +13,8 @@ void add_detect(CLI::App& app, Console& console, int& exit_code);
 void add_flight(CLI::App& app, Console& console, int& exit_code);
 void add_plan(CLI::App& app, Console& console, int& exit_code);
 void add_print_tag(CLI::App& app, Console& console, int& exit_code);
+void add_recover(CLI::App& app, Console& console, int& exit_code);
+void add_replay(CLI::App& app, Console& console, int& exit_code);
 void add_run(CLI::App& app, Console& console, int& exit_code);
 void add_survey(CLI::App& app, Console& console, int& exit_code);
 void add_table(CLI::App& app, Console& console, int& exit_code);

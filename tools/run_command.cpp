@@ -16,6 +16,9 @@ constexpr const char* kExamples = R"(Examples:
   berth flight                                   from 6 m to the docked marker, with the network
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08
   berth run --source sim:scenarios/port.toml --target targets/port.yaml   discs and rings
+  berth run --source v4l2:video0 --record flight.mcap     frames and results, for Foxglove, rosbag2 and replay
+  berth replay flight.mcap --backend opencl      the recording again: the same bits
+  berth recover flight.mcap                      after a loss of power: all that is whole
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
   berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
@@ -27,7 +30,7 @@ constexpr const char* kExamples = R"(Examples:
   berth survey --camera cam.yaml --marker-size 0.05 --out bundle.yaml images/
   berth doctor                                   what this machine has, and what it lacks
 
-Exit codes: 0 all well; 1 verify or eval found a difference, a flight did not dock, or
+Exit codes: 0 all well; 1 verify, eval or replay found a difference, a flight did not dock, or
 calibrate or survey refused the views; 2 bad input or usage.)";
 
 /// "a, b or c": the commands below one; empty where there are none.
@@ -56,6 +59,8 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_detect(app, console, exit_code);
   add_flight(app, console, exit_code);
   add_run(app, console, exit_code);
+  add_replay(app, console, exit_code);
+  add_recover(app, console, exit_code);
   add_verify(app, console, exit_code);
   add_bench(app, console, exit_code);
   add_eval(app, console, exit_code);

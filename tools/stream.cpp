@@ -147,6 +147,7 @@ class StreamRun {
     if (!options_.track) return std::nullopt;
     TrackerConfig tracking;
     if (options_.full_every > 0) tracking.full_every = options_.full_every;
+    if (options_.behind > 0) tracking.behind = options_.behind;
     return tracking;
   }
 
@@ -205,7 +206,8 @@ class StreamRun {
     if (!engine_) make_engine(frame);
     const StreamFrame shown = stream_frame(frame);
     refuse_poses(shown);
-    if (options_.filter && engine_->tracker() != nullptr) {
+    // Not of what came through a pipeline: there it comes too late.
+    if (options_.filter && engine_->tracker() != nullptr && options_.behind == 0) {
       filters_.foretell(frame.stamp.mid_exposure_ns, camera_of(shown), *engine_->tracker());
     }
     const Backend* before = &engine_->backend();

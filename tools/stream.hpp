@@ -28,6 +28,8 @@ struct StreamOptions {
   /// Markers are followed in windows; every so many frames are searched whole, 0 for the tracker's default.
   bool track = false;
   int full_every = 0;
+  /// Of a replay, what was recorded through a pipeline: TrackerConfig::behind there. 0: nothing was.
+  int behind = 0;
   /// 0 for all.
   std::uint64_t max_frames = 0;
   /// In real time, through a pipeline.

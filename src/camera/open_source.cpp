@@ -22,6 +22,7 @@ std::unique_ptr<Source> open_source(const std::string& spec) {
   if (kind == "dir") return open_images(list_images(rest, false));
   if (kind == "file") return open_images({rest});
   if (kind == "video") return open_video(rest);
+  if (kind == "mcap") return open_mcap(rest);
   if (kind == "v4l2") return open_v4l2(parse_v4l2(rest));
 
   std::error_code error;
@@ -29,10 +30,11 @@ std::unique_ptr<Source> open_source(const std::string& spec) {
   if (!std::filesystem::exists(status)) {
     throw Error(spec +
                 ": there is no such file or folder; give a path, or a source as sim:FILE, dir:DIR, file:IMAGE, "
-                "video:FILE or v4l2:CAMERA");
+                "video:FILE, mcap:FILE or v4l2:CAMERA");
   }
   if (std::filesystem::is_directory(status)) return open_images(list_images(spec, false));
   if (ends_with(spec, ".toml")) return open_scenario(spec);
+  if (ends_with(spec, ".mcap")) return open_mcap(spec);
   if (has_image_name(spec)) return open_images({spec});
   return open_video(spec);
 }

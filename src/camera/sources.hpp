@@ -38,9 +38,14 @@ class CameraSource : public Source {
 /// Throws Error when it cannot be opened the first time.
 std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener opener = open_v4l2_device);
 
-/// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `v4l2:CAMERA`. A bare path is
-/// told by what it is: a folder, a name ending in .toml, an image name, otherwise a video. Throws Error that lists what
-/// there is.
+/// The frames of an MCAP recording (docs/recording.md). Of Berth's own they come as they came when it was made: stamp,
+/// label and truth; of others, the images of the first topic that has any, clock "ros". What was not recorded counts as
+/// lost. Behind the last frame, damage or a missing end is an Error. Throws Error when it cannot be opened.
+std::unique_ptr<Source> open_mcap(const std::string& path);
+
+/// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`. A
+/// bare path is told by what it is: a folder, a name ending in .toml or .mcap, an image name, otherwise a video. Throws
+/// Error that lists what there is.
 std::unique_ptr<Source> open_source(const std::string& spec);
 
 }  // namespace berth

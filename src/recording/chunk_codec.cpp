@@ -41,8 +41,8 @@ void ChunkCodec::compress(const Bytes& records, Bytes& out) {
   if (!impl_->deflater) impl_->deflater.reset(ZSTD_createCCtx());
   if (!impl_->deflater) throw Error("zstd: no memory to compress with; free some");
   out.resize(ZSTD_compressBound(records.size()));
-  const std::size_t size = ZSTD_compressCCtx(impl_->deflater.get(), out.data(), out.size(), records.data(),
-                                             records.size(), kLevel);
+  const std::size_t size =
+      ZSTD_compressCCtx(impl_->deflater.get(), out.data(), out.size(), records.data(), records.size(), kLevel);
   if (ZSTD_isError(size) != 0) throw Error(std::string("zstd: compressing failed: ") + ZSTD_getErrorName(size));
   out.resize(size);
 }

@@ -42,9 +42,9 @@ class Reader {
   ChunkCodec codec_;
   Problems problems_;
   Bytes records_;
-  std::size_t at_ = 0;   // in records_
-  bool ahead_ = false;   // advance() went on and nothing of it was given yet
-  bool loose_ = false;   // the scan's record is a message
+  std::size_t at_ = 0;  // in records_
+  bool ahead_ = false;  // advance() went on and nothing of it was given yet
+  bool loose_ = false;  // the scan's record is a message
   Message message_;
   std::map<u16, Channel> channels_;
   std::map<u16, Schema> schemas_;

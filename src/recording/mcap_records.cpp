@@ -96,8 +96,8 @@ bool RecordScan::next(Problems& problems) {
     }
     check_sum(head, problems);
     std::array<u8, kMagic.size()> magic = {};
-    complete_ = op_ == Op::footer && size_ - at_ == magic.size() && read_at(at_, magic.data(), magic.size()) &&
-                magic == kMagic;
+    complete_ =
+        op_ == Op::footer && size_ - at_ == magic.size() && read_at(at_, magic.data(), magic.size()) && magic == kMagic;
     return true;
   }
   return false;

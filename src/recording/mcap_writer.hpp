@@ -11,7 +11,8 @@
 namespace berth::mcap {
 
 /// Writes an MCAP file: header, attachments and metadata, chunks of messages with their indexes, and, when it is
-/// finished, the summary. At any time the file is whole up to the last chunk that was ended. Every Error names the file.
+/// finished, the summary. At any time the file is whole up to the last chunk that was ended. Every Error names the
+/// file.
 class Writer {
  public:
   /// Makes the file or empties it. `profile`: "ros2" where every message is one of ROS 2. Throws Error.

@@ -161,7 +161,7 @@ Recovery recover(const std::string& path, const std::string& out, const std::str
   if (std::filesystem::equivalent(path, out, error)) {
     throw Error(out + ": it is the recording itself; name another file");
   }
-  const Recovery found = examine(path);
+  Recovery found = examine(path);
   if (found.messages == 0) {
     throw Error(path + ": none of its " + std::to_string(found.file_bytes) +
                 " bytes are of a whole chunk; there is nothing to recover");

@@ -23,9 +23,9 @@ struct Recovery {
 /// Reads a file to its end, checksums included. Throws Error where it cannot be read or is no MCAP file.
 Recovery examine(const std::string& path);
 
-/// Writes all that is whole of a file to another, as a whole file: attachments, metadata, every whole chunk as it is, with
-/// new indexes and a new summary. `library`: who says so in its header. Throws Error as examine, where nothing can be
-/// saved, where `out` is `path` by another name, and where it cannot be written.
+/// Writes all that is whole of a file to another, as a whole file: attachments, metadata, every whole chunk as it is,
+/// with new indexes and a new summary. `library`: who says so in its header. Throws Error as examine, where nothing can
+/// be saved, where `out` is `path` by another name, and where it cannot be written.
 Recovery recover(const std::string& path, const std::string& out, const std::string& library);
 
 }  // namespace berth::mcap

@@ -22,7 +22,8 @@ class MemoryFile {
   /// Makes this the file's whole content.
   template <class Bytes>
   void fill(const Bytes& bytes) {
-    if (ftruncate(file_, 0) != 0 || pwrite(file_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
+    if (ftruncate(file_, 0) != 0 ||
+        pwrite(file_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
       throw std::runtime_error("the file in memory cannot be written");
     }
   }

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "berth/detector.hpp"
+#include "frame_queue.hpp"
+#include "recording/mcap_writer.hpp"
+#include "ros2/cdr.hpp"
+#include "ros_dock.hpp"
+
+namespace berth::cli {
+
+/// How frames' pictures are kept.
+enum class RecordPictures { raw, png, none };
+
+/// What a recording says before its first frame, so that a replay needs nothing else (docs/recording.md).
+struct RecordingSetup {
+  std::map<std::string, std::string> settings;
+  std::vector<mcap::Attachment> files;
+};
+
+/// The metadata record with what became of the run.
+inline constexpr const char* kEndMetadata = "berth.end";
+
+/// A run as ROS 2 messages in an MCAP file. Frames are never parted by a chunk's end.
+class RecordingFile {
+ public:
+  /// Makes the file. Throws Error.
+  RecordingFile(const std::string& path, RecordPictures pictures);
+
+  /// Settings, files and topics. `config`: of the frames, for what is in their records; `camera`: what a source of this
+  /// recording has for its own.
+  void begin(const RecordingSetup& setup, const DetectorConfig& config, const std::string& backend,
+             const std::optional<CameraModel>& camera, std::int64_t wall_ns);
+  /// A frame in all its topics. `image` without pixels: without its picture.
+  void write(const QueuedFrame& frame, View2D<const u8> image, std::uint64_t dropped_pictures,
+             std::uint64_t dropped_frames);
+  /// Ends the chunk and has it on the disk, where it is time for that.
+  void keep_up();
+  /// What was dropped, by topic, and the end of the file.
+  void finish(std::uint64_t dropped_pictures, std::uint64_t dropped_frames);
+  /// After an Error: what is whole stays. False when that failed, too.
+  bool cut_back();
+
+  /// Written; after cut_back, those that stayed.
+  std::uint64_t frames() const { return frames_; }
+  u64 bytes() const { return writer_.bytes(); }
+  /// How many messages of each topic were dropped, none left out that has any.
+  std::map<std::string, std::uint64_t> dropped_by_topic(std::uint64_t pictures, std::uint64_t frames) const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void end_chunk();
+  mcap::u16 add_topic(const std::string& topic, const std::string& type, const std::string& schema);
+  void send(mcap::u16 topic);
+  std::int64_t stamp_of(const QueuedFrame& frame);
+  void write_picture(View2D<const u8> image, std::int64_t stamp_ns);
+  void write_poses(const FrameResult& result, std::int64_t stamp_ns);
+  void write_health(const QueuedFrame& frame, std::uint64_t dropped_pictures, std::uint64_t dropped_frames);
+
+  mcap::Writer writer_;
+  RecordPictures pictures_;
+  DetectorConfig config_;
+  std::string backend_;
+  std::optional<RosDock> dock_;
+  ros2::CdrWriter cdr_;
+  std::vector<u8> png_;
+  std::vector<std::string> topics_;
+  mcap::u16 image_ = 0, camera_ = 0, detections_ = 0, transforms_ = 0, pose_ = 0, frame_ = 0, health_ = 0, record_ = 0;
+  std::vector<u32> sequences_;
+  u64 log_time_ = 0, stamp_time_ = 0;  // of the messages being written
+  std::int64_t start_wall_ns_ = 0, start_monotonic_ns_ = 0;
+  bool has_first_ = false;
+  std::int64_t first_ns_ = 0;  // the first frame's time, on a clock that is not the monotonic one
+  std::int64_t next_health_ns_ = 0;
+  Clock::time_point chunk_began_, synced_;
+  std::uint64_t frames_ = 0, whole_frames_ = 0;
+};
+
+}  // namespace berth::cli
