@@ -46,6 +46,6 @@ install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright DESTINATION ${CMAKE_INST
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth COMPONENT tools
         PATTERN Doxyfile EXCLUDE)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/berth.service DESTINATION lib/systemd/system COMPONENT tools)
-install(FILES ${PROJECT_SOURCE_DIR}/packaging/berth.default DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth/examples
+install(FILES ${PROJECT_SOURCE_DIR}/packaging/berth.toml DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/berth/examples
         COMPONENT tools)
 include(CPack)

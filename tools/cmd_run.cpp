@@ -23,6 +23,7 @@ namespace {
 constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
+  berth run --config berth.toml                  options from a file: berth config --explain
   berth run --source dir:recording/ --json - | jq .detections
   berth run --source sim:scenarios/approach.toml --filter --json log.jsonl
   berth run --source sim:scenarios/track.toml --track --json log.jsonl
@@ -73,7 +74,7 @@ bool is_same_file(const std::string& source, const std::string& file) {
 
 void add_run(CLI::App& app, Console& console, int& exit_code) {
   struct Options {
-    std::string source;
+    std::string source, config;
     StreamOptions stream;
     RecordOptions record;
     RosOptions ros;
@@ -87,6 +88,9 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
                    "(docs/cameras.md), or a path that tells")
       ->type_name("SOURCE")
       ->required();
+  // Read before the command line is parsed: run_config.hpp.
+  command->add_option("--config", options->config, "TOML file of these options; berth config --explain has its keys")
+      ->type_name("FILE");
   command->add_option("--json", options->stream.log, "log: one JSON line a frame; - for standard output")
       ->type_name("FILE");
   command->add_option("--svg", options->stream.svg, "drawing of the trajectory")->type_name("FILE");

@@ -23,5 +23,7 @@ void add_bench(CLI::App& app, Console& console, int& exit_code);
 void add_eval(CLI::App& app, Console& console, int& exit_code);
 void add_model(CLI::App& app, Console& console, int& exit_code);
 void add_doctor(CLI::App& app, Console& console, int& exit_code);
+/// Explains the subcommand `run`.
+void add_config(CLI::App& app, Console& console);
 
 }  // namespace berth::cli

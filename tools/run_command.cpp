@@ -1,10 +1,15 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <opencv2/core/utils/logger.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "berth/error.hpp"
 #include "commands.hpp"
+#include "run_config.hpp"
 
 namespace berth::cli {
 namespace {
@@ -28,6 +33,7 @@ constexpr const char* kExamples = R"(Examples:
   berth table                                    the paper's six-axis table, simulated: errors of every axis
   berth calibrate --board aprilgrid --grid 5x7 --size 0.03 --out cam.yaml images/
   berth survey --camera cam.yaml --marker-size 0.05 --out bundle.yaml images/
+  berth config --explain                         the keys of a file for berth run --config
   berth doctor                                   what this machine has, and what it lacks
 
 Exit codes: 0 all well; 1 verify, eval or replay found a difference, a flight did not dock, or
@@ -70,10 +76,13 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_survey(app, console, exit_code);
   add_table(app, console, exit_code);
   add_doctor(app, console, exit_code);
+  add_config(app, console);
   // What OpenCV has to say about a file, Berth says better.
   if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_ERROR);
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> arguments = with_config(*app.get_subcommand("run"), {argv + 1, argv + argc});
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+    app.parse(std::move(arguments));
   } catch (const CLI::RequiredError& error) {
     // CLI11 tells a mistyped command only as the lack of one.
     const CLI::App* command = &app;

@@ -1,12 +1,11 @@
-#include <algorithm>
 #include <memory>
 #include <mutex>
-#include <numeric>
 #include <string>
 #include <vector>
 
 #include "berth/error.hpp"
 #include "berth/marker.hpp"
+#include "near_names.hpp"
 
 namespace berth {
 namespace {
@@ -44,38 +43,6 @@ std::unique_ptr<const MarkerFamily> make_family(const FamilyTable& table) {
   return family;
 }
 
-// Levenshtein distance, for the "did you mean" of an unknown name.
-int edit_distance(const std::string& a, const std::string& b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = row[0];
-    row[0] = static_cast<int>(i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const int replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row[b.size()];
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
-}
-
-std::string near_names(const std::string& name) {
-  std::vector<std::pair<int, std::string>> order;
-  for (const std::string& known : family_names()) order.emplace_back(edit_distance(lower(name), lower(known)), known);
-  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::string text;
-  for (std::size_t i = 0; i < 3 && i < order.size(); ++i) text += (i == 0 ? "" : ", ") + order[i].second;
-  return text;
-}
-
 }  // namespace
 
 const std::vector<std::string>& family_names() {
@@ -97,7 +64,7 @@ const MarkerFamily& family(const std::string& name) {
     if (!families[i]) families[i] = make_family(kFamilyTables[i]);
     return *families[i];
   }
-  throw Error("unknown marker family \"" + name + "\"; near names: " + near_names(name) + " (of " +
+  throw Error("unknown marker family \"" + name + "\"; near names: " + near_names(name, family_names(), 3) + " (of " +
               std::to_string(kFamilyCount) + " families)");
 }
 
