@@ -10,7 +10,6 @@
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
 #include "clock.hpp"
-#include "corner_bound.hpp"
 #include "engines.hpp"
 #include "exact_math.hpp"
 #include "run_main.hpp"
@@ -18,6 +17,7 @@
 #include "sim/close_up.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
+#include "table/corner_bound.hpp"
 #include "target/photometric_fit.hpp"
 
 namespace berth::bench {
@@ -121,7 +121,7 @@ class Bench {
     opencv_->run(image.view());
     row.opencv.add(truth, opencv_->found());
     if (has_bound) {
-      const double bound = corner_bound_px(scene);
+      const double bound = table::corner_bound_px(table::corner_information(scene)).value();
       row.bound_squares += bound * bound;
     }
     ++row.frames;

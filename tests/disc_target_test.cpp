@@ -4,12 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "berth/error.hpp"
 #include "support/disc_scene.hpp"
 #include "support/scratch_folder.hpp"
+#include "target/disc_choice.hpp"
 #include "target/disc_pose.hpp"
 
 namespace berth {
@@ -116,6 +119,42 @@ TEST(DiscEllipse, IsTheOutlineAsThePoseShowsIt) {
       }
     }
   }
+}
+
+DiscAssignment assignment(std::initializer_list<int> discs) {
+  DiscAssignment result;
+  result.fill(kNoDisc);
+  std::copy(discs.begin(), discs.end(), result.begin());
+  return result;
+}
+
+TEST(DiscChoice, IsDoubtfulInWhateverOrderTheWaysCome) {
+  struct Way {
+    DiscAssignment assignment;
+    int used;
+    double chi_square;
+  };
+  // The first and the last go together (a disc more or less); the second is the target turned by a quarter.
+  std::vector<Way> ways = {{assignment({0, 1, 2, kNoDisc, 4}), 4, 9},
+                           {assignment({1, 2, 0, kNoDisc, 4}), 4, 20},
+                           {assignment({0, 1, 2, 3, kNoDisc}), 4, 7}};
+  const auto doubtful = [&](std::initializer_list<std::size_t> order) {
+    DiscChoice choice;
+    for (const std::size_t i : order) choice.offer(ways[i].assignment, ways[i].used, ways[i].chi_square);
+    return choice.is_doubtful();
+  };
+  const auto in_any_order = [&](bool expected) {
+    for (const auto& order : std::vector<std::initializer_list<std::size_t>>{
+             {0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
+      EXPECT_EQ(doubtful(order), expected);
+    }
+  };
+  in_any_order(true);
+  ways[1].chi_square = 60;  // fits much worse
+  in_any_order(false);
+  ways[1] = {assignment({1, 2, 0, kNoDisc, kNoDisc}), 3, 1};  // takes fewer discs
+  in_any_order(false);
+  EXPECT_TRUE(DiscChoice().empty());
 }
 
 }  // namespace

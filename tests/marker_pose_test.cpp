@@ -145,6 +145,37 @@ TEST(MarkerPose, SaysWhenTheCornersDoNotTellWhichPoseItIs) {
   EXPECT_LT(difference(pose, near), 0.01);
 }
 
+// Corners whose errors go together and are not equally large: what they are off in pixels may speak for the wrong pose.
+TEST(MarkerPose, ChoosesByWhatTheCornersKnow) {
+  sim::Random random(12);
+  const CameraModel camera = paper_camera();
+  int doubles = 0, wrong = 0, wrong_by_pixels = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Pose truth = random_pose(random, 0.3, 0.8, 0.3);
+    Corners4 corners = seen_corners(camera, truth, kSide_m);
+    CornerCovariance covariance{};
+    for (int k = 0; k < 8; ++k) {
+      const double size_px = k < 4 ? 0.2 : 0.02, by = normal(random);
+      std::array<double, 8> error;
+      for (double& value : error) value = size_px * normal(random);
+      for (std::size_t j = 0; j < 64; ++j) covariance[j] += error[j / 8] * error[j % 8];
+      for (std::size_t j = 0; j < 8; ++j) corners[j / 2][j % 2] += by * error[j];
+    }
+    Pose pose;
+    PoseUncertainty uncertainty;
+    if (!marker_pose(camera, kSide_m, corners, covariance, pose, uncertainty) || !uncertainty.has_other) continue;
+    ++doubles;
+    ASSERT_GE(uncertainty.other_excess, 0);
+    ASSERT_LE(uncertainty.ambiguity(), 1);
+    const bool is_wrong = difference(uncertainty.other, truth) < difference(pose, truth);
+    wrong += is_wrong ? 1 : 0;
+    wrong_by_pixels += is_wrong == (uncertainty.error_px <= uncertainty.other_error_px) ? 1 : 0;
+  }
+  EXPECT_GT(doubles, 500);
+  EXPECT_GT(wrong, 0);
+  EXPECT_LT(wrong, wrong_by_pixels);
+}
+
 TEST(MarkerPose, ScalesWithTheMarker) {
   sim::Random random(6);
   const CameraModel camera = paper_camera();

@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sim/geometry.hpp"
 #include "support/noisy_corners.hpp"
@@ -86,6 +88,12 @@ TEST(Stations, AgreeOnExactViews) {
   }
 }
 
+double apart(const Pose& a, const Pose& b) {
+  double most = 0;
+  for (const double value : step_between(a, b)) most = std::max(most, std::fabs(value));
+  return most;
+}
+
 double turn_of_error(const Pose& found, const Pose& truth) {
   const auto error = step_between(found, truth);
   return length({error[3], error[4], error[5]});
@@ -148,6 +156,43 @@ TEST(Stations, NeedAViewWithItsUncertainty) {
   pose.views = -1;
   EXPECT_FALSE(relative_pose(scene.pair, &robot, &dock, pose));
   EXPECT_EQ(pose.views, -1) << "left alone";
+}
+
+TEST(Stations, DoWithoutAViewWhoseCovarianceIsNone) {
+  sim::Random random(5);
+  const Scene scene = random_scene(random);
+  const Detection robot = view_of(scene.to_robot, random), dock = view_of(scene.to_dock, random);
+  for (const double variance : {0.0, -0.01, std::nan("")}) {
+    Detection broken = dock;
+    broken.corner_covariance_px2 = independent_corners(kNoise_px);
+    (*broken.corner_covariance_px2)[9 * 3] = variance;
+    RelativePose pose, alone;
+    ASSERT_TRUE(relative_pose(scene.pair, &robot, nullptr, alone));
+    ASSERT_TRUE(relative_pose(scene.pair, &robot, &broken, pose));
+    EXPECT_EQ(pose.views, 1);
+    EXPECT_EQ(pose.pose.t, alone.pose.t);
+    EXPECT_FALSE(relative_pose(scene.pair, nullptr, &broken, pose));
+  }
+}
+
+// By the corners as this station weighs them, whatever the detection came with.
+TEST(Stations, TakeTheBetterOfAPlanesTwoPoses) {
+  sim::Random random(6);
+  int doubles = 0;
+  for (int i = 0; i < 50; ++i) {
+    const Scene scene = random_scene(random);
+    const Detection robot = view_of(scene.to_robot, random);
+    if (!robot.pose_uncertainty->has_other) continue;
+    ++doubles;
+    Detection swapped = robot;
+    std::swap(swapped.pose, swapped.pose_uncertainty->other);
+    RelativePose pose, same;
+    ASSERT_TRUE(relative_pose(scene.pair, &robot, nullptr, pose));
+    ASSERT_TRUE(relative_pose(scene.pair, &swapped, nullptr, same));
+    EXPECT_GE(same.uncertainty.other_excess, 0);
+    EXPECT_LT(apart(same.pose, pose.pose), 1e-6);
+  }
+  EXPECT_GT(doubles, 10);
 }
 
 }  // namespace

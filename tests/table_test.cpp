@@ -115,6 +115,9 @@ sim::Sensor noiseless() {
   return sensor;
 }
 
+// Quick, and fine enough for what is asked here.
+constexpr int kCoarse = 1;
+
 cli::EngineOptions simd() {
   cli::EngineOptions options;
   options.backend = "simd";
@@ -124,7 +127,7 @@ cli::EngineOptions simd() {
 // A corner order, a pixel's centre or an axis taken wrongly shows as degrees and centimetres.
 TEST(TableReaders, AllMeasureTheSamePoseInTheSameFrame) {
   const CameraModel camera = paper_camera();
-  const table::Stage stage(camera, noiseless());
+  const table::Stage stage(camera, noiseless(), kCoarse);
   cli::TableReaders readers(simd(), camera);
   table::Stop stop{0, 0.08, sim::translation(0.05, -0.03, 0.5)};
   stop.truth.R = sim::rotation(25 * kDegree, -20 * kDegree, 100 * kDegree);
@@ -141,7 +144,7 @@ TEST(TableReaders, AllMeasureTheSamePoseInTheSameFrame) {
 
 TEST(TableRun, TellsAGoodMethodFromABadOne) {
   const CameraModel camera = paper_camera();
-  const table::Stage stage(camera, noiseless());
+  const table::Stage stage(camera, noiseless(), kCoarse);
   cli::TableReaders readers(simd(), camera);
   int frames = 0;
   const auto run = [&](std::size_t axis) {
@@ -160,9 +163,24 @@ TEST(TableRun, TellsAGoodMethodFromABadOne) {
   EXPECT_GT(turned.errors(1).axes[4].rms(), 3 * turned.errors(0).axes[4].rms());
 }
 
+TEST(TableRun, SetsEachFramesBoundBesideIt) {
+  const table::Stage stage(paper_camera(), sim::Sensor(), kCoarse);
+  cli::TableReaders readers(simd(), paper_camera());
+  table::Sweep sweep{"mine", "frame", std::nullopt, {}};
+  for (const double range_m : {0.5, 1.0}) sweep.stops.push_back({0, 0.0745, sim::translation(0, 0, range_m)});
+  const cli::TableSweep run = cli::run_sweep(sweep, stage, 1, readers, [] {});
+  ASSERT_TRUE(run.frames[0].bound && run.frames[1].bound);
+  // Half the range, twice the side in px: four times the pixels and edges twice as long, each as steep as before.
+  EXPECT_LT(run.frames[0].corner_bound_px, 0.8 * run.frames[1].corner_bound_px);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_LT((*run.frames[0].bound)[i], 0.6 * (*run.frames[1].bound)[i]) << i;
+  EXPECT_EQ(run.bound().count(), 2);
+  EXPECT_GT(run.bound().rms(2), (*run.frames[0].bound)[2]);
+  EXPECT_LT(run.bound().rms(2), (*run.frames[1].bound)[2]);
+}
+
 TEST(TableRun, CountsOnlyWhatIsWhollyInView) {
   const CameraModel camera = paper_camera();
-  const table::Stage stage(camera, noiseless());
+  const table::Stage stage(camera, noiseless(), kCoarse);
   cli::TableReaders readers(simd(), camera);
   table::Sweep sweep{"mine", "frame", std::nullopt, {}};
   sweep.stops.push_back({0, 0.08, sim::translation(0, 0, 1)});
@@ -170,12 +188,14 @@ TEST(TableRun, CountsOnlyWhatIsWhollyInView) {
   const cli::TableSweep run = cli::run_sweep(sweep, stage, 1, readers, [] {});
   EXPECT_TRUE(run.frames[0].shown);
   EXPECT_FALSE(run.frames[1].shown);
+  EXPECT_TRUE(run.frames[0].bound);
+  EXPECT_FALSE(run.frames[1].bound);
   EXPECT_EQ(run.errors(0).shown, 1);
 }
 
 TEST(TableRun, HasASecondCameraOnThePlate) {
   const CameraModel camera = paper_camera();
-  const table::Stage stage(camera, noiseless());
+  const table::Stage stage(camera, noiseless(), kCoarse);
   cli::TableReaders readers(simd(), camera, 2);
   const std::size_t plate = readers.names().size() - 2, both = plate + 1;
   const auto run = [&](std::size_t axis) {
@@ -195,11 +215,13 @@ TEST(TableRun, HasASecondCameraOnThePlate) {
 TEST(CliTable, PrintsTablesAndWritesFiles) {
   const test::ScratchFolder folder;
   const auto run = test::run_berth({"table", "--only", "z,rectangle,still", "--frames", "4", "--backend", "simd",
-                                    "--blur", "0.8", "--noise", "1.5", "--out", folder / "out"});
+                                    "--blur", "0.8", "--noise", "1.5", "--fineness", "1", "--out", folder / "out"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("side 74.5 mm: 50.0 px at 1 m"));
   EXPECT_THAT(run.out, HasSubstr("blur σ 0.8 px"));
   EXPECT_THAT(run.out, HasSubstr("read noise 1.5"));
+  EXPECT_THAT(run.out, HasSubstr("blur computed at 1/1 px"));
+  EXPECT_THAT(run.out, HasSubstr("| z 0.15 … 1.5 m | bound of one image | | – | "));
   EXPECT_THAT(run.out, HasSubstr("| z 0.15 … 1.5 m | Berth | 4/4 |"));
   EXPECT_THAT(run.out, HasSubstr("Z-XY RMS mm"));
   EXPECT_THAT(run.out, HasSubstr("mean error ± standard deviation"));
@@ -208,6 +230,7 @@ TEST(CliTable, PrintsTablesAndWritesFiles) {
   const auto methods = static_cast<std::ptrdiff_t>(cli::TableReaders(simd(), paper_camera()).names().size());
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 3 * 4 * methods);
   const std::string heading = csv.substr(0, csv.find('\n'));
+  EXPECT_THAT(heading, HasSubstr("bound_rz_deg,bound_corner_px"));
   const std::string line = csv.substr(heading.size() + 1, csv.find('\n', heading.size() + 1) - heading.size() - 1);
   EXPECT_EQ(std::count(line.begin(), line.end(), ','), std::count(heading.begin(), heading.end(), ','));
   for (const char* name : {"out/axes.svg", "out/rectangle.svg", "out/trajectory.svg"}) {

@@ -13,7 +13,8 @@ using MethodNames = std::vector<std::string>;
 std::string setup_text(const table::Stage& stage, const table::Nominal& nominal, int frames, u64 seed,
                        const std::string& engine);
 
-/// For each moved axis and method: its own error, largest and RMS, in mm or degrees, and as % of the range.
+/// For each moved axis and method: its own error, largest and RMS, in mm or degrees, and as % of the range; before
+/// them what the best estimator of one image could have.
 std::string axes_table(const std::vector<TableSweep>& sweeps, const MethodNames& methods);
 /// What one axis' motion leaves in all six, RMS, of the first method.
 std::string crosstalk_table(const std::vector<TableSweep>& sweeps, const MethodNames& methods);

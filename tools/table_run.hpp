@@ -16,6 +16,10 @@ struct TableFrame {
   TruthMarker truth;
   /// The marker was wholly in view; frames where it was not count for nothing.
   bool shown = false;
+  /// The bounds of its pose's axes, m and rad, and of its corners' RMS distance, px; none where it was not shown, or
+  /// where the image does not tell.
+  std::optional<table::SixAxes> bound;
+  double corner_bound_px = 0;
   /// One of each method, in TableReaders' order.
   std::vector<std::optional<Reading>> readings;
 };
@@ -26,6 +30,8 @@ struct TableSweep {
   std::vector<TableFrame> frames;
 
   table::SweepErrors errors(std::size_t method) const;
+  /// Of the best estimator there could be that has one camera's frame alone.
+  table::SweepBound bound() const;
 };
 
 /// Looks at every stop once. `progress` is called after each frame.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -47,16 +48,23 @@ struct PoseUncertainty {
   std::array<double, 36> covariance = {};
   /// Root mean square distance of the corners from where the pose says they are, px.
   double error_px = 0;
-  /// A plane seen from far away fits nearly as well tilted the other way: that pose, and its error.
+  /// The same, sum of squares in the corners' standard deviations: what least squares make least, and what says which
+  /// of two poses it is.
+  double chi_square = 0;
+  /// A plane seen from far away fits nearly as well tilted the other way: that pose, and its error in px, which may be
+  /// the smaller one where corners are not equally well known.
   bool has_other = false;
   Pose other;
   double other_error_px = 0;
-  /// As `covariance`, of `other`; and how much worse it fits, in squares of standard deviations of the corners: it is
-  /// e^(-excess/2) times as likely.
+  /// As `covariance`, of `other`; and how much larger its chi-square is, never below 0: it is e^(-excess/2) times as
+  /// likely.
   std::array<double, 36> other_covariance = {};
   double other_excess = 0;
-  /// 0: no doubt which of the two it is; 1: the corners do not tell.
-  double ambiguity() const { return has_other && other_error_px > 0 ? error_px / other_error_px : has_other ? 1 : 0; }
+  /// Ratio of the two errors in standard deviations. 0: no doubt which of the two it is; 1: the corners do not tell.
+  double ambiguity() const {
+    const double other_square = chi_square + other_excess;
+    return !has_other ? 0 : other_square > 0 ? std::sqrt(chi_square / other_square) : 1;
+  }
 };
 
 /// Covariance of a marker's corners, px²: of x and y of the first, of the second, …; row-major 8 × 8.

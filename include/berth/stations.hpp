@@ -44,8 +44,9 @@ struct RelativePose {
 
 /// The robot's pose from what one station's detector says, or both; null where a station does not see its marker. With
 /// both: the least squares of all eight corners' reprojection errors in both images, from every pair of solutions of
-/// the two planes. Both images must be of one time. Returns false, and leaves `result` alone, where no view has a pose
-/// with its uncertainty (PoseMethod::least_squares) or the corners do not determine one.
+/// the two planes. Both images must be of one time. A view without a pose and its uncertainty
+/// (PoseMethod::least_squares), or whose corners' covariance is none (not positive definite), counts as null. Returns
+/// false, and leaves `result` alone, where no view is left or the corners do not determine a pose.
 bool relative_pose(const StationPair& stations, const Detection* robot, const Detection* dock, RelativePose& result);
 
 }  // namespace berth

@@ -142,6 +142,21 @@ RayMap::RayMap(const CameraModel& camera) : camera_(camera) {
   set_bounds();
 }
 
+RayMap RayMap::part(int left, int top, int width, int height) const {
+  RayMap result;
+  result.camera_ = camera_;
+  result.camera_.width = width;
+  result.camera_.height = height;
+  result.camera_.cx -= left;
+  result.camera_.cy -= top;
+  for (int row = top; row <= top + height; ++row) {
+    const Vec2* const first = &corner(left, row);
+    result.corners_.insert(result.corners_.end(), first, first + width + 1);
+  }
+  result.set_bounds();
+  return result;
+}
+
 void RayMap::set_bounds() {
   low_ = high_ = corners_[0];
   for (const Vec2& corner : corners_) {

@@ -25,11 +25,14 @@ class RayMap {
     return corners_[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera_.width + 1) +
                     static_cast<std::size_t>(column)];
   }
+  /// Those of a part of the image, the same rays: `width` × `height` pixels from (left, top), which lie inside.
+  RayMap part(int left, int top, int width, int height) const;
   /// Smallest and largest x and y of all rays.
   const Vec2& low() const { return low_; }
   const Vec2& high() const { return high_; }
 
  private:
+  RayMap() = default;
   void set_bounds();
 
   CameraModel camera_;

@@ -75,21 +75,39 @@ CameraModel magnified(CameraModel camera, int factor) {
   return camera;
 }
 
-// Means over squares of factor × factor.
-std::vector<double> binned(const std::vector<double>& fine, int width, int height, int factor) {
-  std::vector<double> result;
-  result.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      double sum = 0;
-      for (int i = 0; i < factor * factor; ++i) {
-        const std::size_t row = static_cast<std::size_t>(y * factor + i / factor);
-        sum += fine[row * static_cast<std::size_t>(width * factor) + static_cast<std::size_t>(x * factor + i % factor)];
+// Pixels, ends not included.
+struct Window {
+  int left, top, right, bottom;
+  bool empty() const { return left >= right || top >= bottom; }
+  Window wider(int by, const CameraModel& camera) const {
+    return {std::max(0, left - by), std::max(0, top - by), std::min(camera.width, right + by),
+            std::min(camera.height, bottom + by)};
+  }
+};
+
+// The pixels where a surface may be seen; all where a part of it is beside or behind the camera.
+Window window_of(const Surface& surface, const CameraModel& camera) {
+  constexpr int kPoints = 16;  // along a side, which a lens may bend
+  const Window all = {0, 0, camera.width, camera.height};
+  std::vector<Vec2> outline = surface.outline;
+  if (surface.outer_radius > 0) outline = rectangle(2 * surface.outer_radius, 2 * surface.outer_radius);
+  Vec2 low = {1e9, 1e9}, high = {-1e9, -1e9};
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vec2 &a = outline[i], &b = outline[(i + 1) % outline.size()];
+    for (int k = 0; k < kPoints; ++k) {
+      const double s = static_cast<double>(k) / kPoints;
+      const Vec3 at = transform(surface.pose, Vec3{a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), 0});
+      if (at[2] < kNear_m) return all;
+      const Vec2 pixel = image_point(camera, {at[0] / at[2], at[1] / at[2]});
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        if (!(pixel[axis] > -1e6 && pixel[axis] < 1e6)) return all;
+        low[axis] = std::min(low[axis], pixel[axis]);
+        high[axis] = std::max(high[axis], pixel[axis]);
       }
-      result.push_back(sum / (factor * factor));
     }
   }
-  return result;
+  const auto pixel = [](double place) { return static_cast<int>(floor_int(place)); };
+  return Window{pixel(low[0]), pixel(low[1]), pixel(high[0]) + 2, pixel(high[1]) + 2}.wider(0, camera);
 }
 
 }  // namespace
@@ -101,14 +119,44 @@ GrayImage Renderer::render(const Scene& scene) const {
   if (!same_camera(scene.camera, rays_.camera())) {
     throw Error("simulator: the scene's camera is not the renderer's: make a Renderer for each camera");
   }
-  std::vector<double> radiance = paint(scene, drawn(scene).surfaces, fine_rays_);
+  const std::vector<Surface> surfaces = drawn(scene).surfaces;
+  std::vector<double> radiance = paint(scene, surfaces, rays_);
   if (fineness_ == 1) return sensor_.expose(scene.sensor, rays_, std::move(radiance), scene.seed);
-  const CameraModel& fine = fine_rays_.camera();
-  disc_blur(radiance, fine.width, fine.height, fineness_ * scene.sensor.defocus_px);
-  gaussian_blur(radiance, fine.width, fine.height, fineness_ * scene.sensor.blur_sigma_px);
   Sensor sensor = scene.sensor;
+  disc_blur(radiance, camera().width, camera().height, sensor.defocus_px);
+  gaussian_blur(radiance, camera().width, camera().height, sensor.blur_sigma_px);
+  for (const Surface& surface : surfaces) {
+    if (surface.fine) refine(scene, surfaces, surface, radiance);
+  }
   sensor.blur_sigma_px = sensor.defocus_px = 0;
-  return sensor_.expose(sensor, rays_, binned(radiance, camera().width, camera().height, fineness_), scene.seed);
+  return sensor_.expose(sensor, rays_, std::move(radiance), scene.seed);
+}
+
+// Replaces the blurred radiance on and about a surface by means of what is painted and blurred in smaller pixels.
+void Renderer::refine(const Scene& scene, const std::vector<Surface>& surfaces, const Surface& about,
+                      std::vector<double>& radiance) const {
+  const Sensor& sensor = scene.sensor;
+  // As far as the blur carries, and twice: once for where the surface shows, once for what is seen there.
+  const int reach = static_cast<int>(4 * sensor.blur_sigma_px + sensor.defocus_px) + 2;
+  const double moves = motion_px(camera(), scene.motion, std::max(kNear_m, about.pose.t[2]));
+  const Window inner = window_of(about, camera()).wider(reach + static_cast<int>(moves) + 1, camera());
+  if (inner.empty()) return;
+  const Window outer = inner.wider(reach, camera());
+  const int width = fineness_ * (outer.right - outer.left), height = fineness_ * (outer.bottom - outer.top);
+  const RayMap rays = fine_rays_.part(fineness_ * outer.left, fineness_ * outer.top, width, height);
+  std::vector<double> fine = paint(scene, surfaces, rays);
+  disc_blur(fine, width, height, fineness_ * sensor.defocus_px);
+  gaussian_blur(fine, width, height, fineness_ * sensor.blur_sigma_px);
+  for (int y = inner.top; y < inner.bottom; ++y) {
+    for (int x = inner.left; x < inner.right; ++x) {
+      double sum = 0;
+      for (int row = fineness_ * (y - outer.top); row < fineness_ * (y - outer.top + 1); ++row) {
+        const std::size_t first = static_cast<std::size_t>(row * width + fineness_ * (x - outer.left));
+        for (int k = 0; k < fineness_; ++k) sum += fine[first + static_cast<std::size_t>(k)];
+      }
+      radiance[static_cast<std::size_t>(y * camera().width + x)] = sum / (fineness_ * fineness_);
+    }
+  }
 }
 
 GrayImage render(const Scene& scene) { return Renderer(scene.camera).render(scene); }

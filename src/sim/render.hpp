@@ -14,10 +14,10 @@ namespace berth::sim {
 /// at once. A scene has the same bits on every machine and under every compiler: docs/simulator.md says why.
 class Renderer {
  public:
-  /// `fineness`: points a pixel's side in which the lens' blur is computed before pixels collect it, 1 … 8. With 1 the
-  /// blur's taps lie at whole pixels, so that edges along rows or columns rise in straight pieces, as under no lens;
-  /// where corners are measured to hundredths of a pixel, 4 is asked for. Throws Error on a camera whose lens is not
-  /// one-to-one inside the image.
+  /// `fineness`: points a pixel's side in which the lens' blur is computed before pixels collect it, 1 … 8, on and
+  /// about surfaces that are `fine`. With 1 the blur's taps lie at whole pixels, so that edges along rows or columns
+  /// rise in straight pieces, as under no lens; where corners are measured to hundredths of a pixel, 4 is asked for.
+  /// Throws Error on a camera whose lens is not one-to-one inside the image.
   explicit Renderer(const CameraModel& camera, int fineness = 1);
 
   const CameraModel& camera() const { return rays_.camera(); }
@@ -25,6 +25,9 @@ class Renderer {
   GrayImage render(const Scene& scene) const;
 
  private:
+  void refine(const Scene& scene, const std::vector<Surface>& surfaces, const Surface& about,
+              std::vector<double>& radiance) const;
+
   int fineness_;
   RayMap rays_;
   RayMap fine_rays_;

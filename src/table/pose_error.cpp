@@ -47,4 +47,20 @@ void SweepErrors::add_corners(const std::array<std::array<double, 2>, 4>& seen,
   }
 }
 
+void SweepBound::add(const SixAxes& deviations, double corner_px, double range_m) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    axes_[i].add(deviations[i]);
+    squares_[i].add(deviations[i] * deviations[i]);
+  }
+  for (std::size_t i = 0; i < 3; ++i) shares_[i].add(deviations[i] / range_m);
+  position_share_.add(length({deviations[0], deviations[1], deviations[2]}) / range_m);
+  corners_px_.add(corner_px);
+}
+
+double SweepBound::rms_deviation(std::size_t axis) const {
+  // The sum S of squares has the variance 2 Σσ⁴; √(S / n) that over 4 n S.
+  const double mean_square = squares_[axis].mean(), fourth = squares_[axis].rms();
+  return mean_square > 0 ? fourth / std::sqrt(2.0 * count() * mean_square) : 0;
+}
+
 }  // namespace berth::table

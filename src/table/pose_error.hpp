@@ -49,4 +49,25 @@ struct SweepErrors {
   void add_corners(const std::array<std::array<double, 2>, 4>& seen, const std::array<std::array<double, 2>, 4>& truth);
 };
 
+/// Errors of the best estimator there could be over one sweep, from each frame's own bound (corner_bound.hpp).
+class SweepBound {
+ public:
+  /// A frame's: standard deviation of each axis, RMS distance of a corner (px), distance from the camera.
+  void add(const SixAxes& deviations, double corner_px, double range_m);
+
+  int count() const { return axes_[0].count(); }
+  /// Root mean square over the frames: what SweepErrors' RMS would be expected to be.
+  double rms(std::size_t axis) const { return axes_[axis].rms(); }
+  /// Standard deviation of that RMS over so few frames, normal errors taken.
+  double rms_deviation(std::size_t axis) const;
+  double share(std::size_t axis) const { return shares_[axis].rms(); }
+  double position_share() const { return position_share_.rms(); }
+  double corners_px() const { return corners_px_.rms(); }
+
+ private:
+  std::array<ErrorSum, 6> axes_, squares_;
+  std::array<ErrorSum, 3> shares_;
+  ErrorSum position_share_, corners_px_;
+};
+
 }  // namespace berth::table

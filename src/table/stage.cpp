@@ -12,7 +12,7 @@ constexpr double kWallAlbedo = 0.4;
 
 }  // namespace
 
-StageFrame Stage::look(const Stop& stop, u64 seed) const {
+sim::Scene Stage::scene(const Stop& stop, u64 seed) const {
   sim::Scene scene;
   scene.camera = camera();
   scene.sensor = sensor_;
@@ -24,7 +24,12 @@ StageFrame Stage::look(const Stop& stop, u64 seed) const {
   marker.size_m = stop.size_m;
   marker.pose = stop.truth;
   scene.markers.push_back(marker);
-  return {renderer_.render(scene), sim::truth(scene).front()};
+  return scene;
+}
+
+StageFrame Stage::look(const Stop& stop, u64 seed) const {
+  const sim::Scene shown = scene(stop, seed);
+  return {renderer_.render(shown), sim::truth(shown).front(), corner_information(shown)};
 }
 
 }  // namespace berth::table

@@ -21,8 +21,6 @@ constexpr double kPlace = 0.35, kSize = 1.6;
 constexpr double kCenter_px = 0.5, kCenterShare = 0.02, kAxis = 0.12, kAxis_px = 0.4;
 // Pairs that are followed up, and points along a bar.
 constexpr int kMostPairs = 4000, kBarPoints = 5, kBarDark = 4;
-// Squares of standard deviations by which the better of two assignments must be better.
-constexpr double kDoubt = 30;
 // Of the discs' mean contrast, by how much one may be lighter than they are on the mean.
 constexpr double kDark = 0.25;
 // A bar is looked at inside of these shares of its length.
@@ -111,52 +109,33 @@ void DiscMatcher::find(const CameraModel& camera, View2D<const u8> image, const 
   pairs_ = 0;
   const std::size_t parts = target_.discs.size();
   Solution best;
-  bool doubtful = false;
+  DiscChoice choice;
   // Any two of the frame's discs as any two of the target's.
   for (std::size_t i = 0; i < count_; ++i) {
     for (std::size_t j = i + 1; j < count_; ++j) {
       for (std::size_t k = 0; k < parts; ++k) {
         for (std::size_t l = 0; l < parts; ++l) {
-          Assignment assignment{};
+          DiscAssignment assignment{};
           if (k == l || !may_be(k, i) || !may_be(l, j) || pairs_ >= kMostPairs) continue;
           if (!assign_from(i, j, k, l, assignment) || is_known(assignment)) continue;
           Solution solution;
           if (!attempt(camera, image, assignment, solution)) continue;
-          if (solution.used < best.used) continue;
-          const double excess = solution.pose.chi_square - best.pose.chi_square;
-          const bool better = solution.used > best.used || excess < 0;
-          if (solution.used == best.used && std::fabs(excess) < kDoubt && contradict(solution, best)) {
-            doubtful = true;
-          } else if (better) {
-            doubtful = false;
-          }
-          if (better) best = solution;
+          if (choice.offer(solution.assignment, solution.used, solution.pose.chi_square)) best = solution;
         }
       }
       if (best.used == static_cast<int>(parts)) i = j = count_;
     }
   }
-  if (best.used == 0 || doubtful) return;
+  if (choice.empty() || choice.is_doubtful()) return;
   result.has_pose = true;
   result.pose = best.pose.pose;
   result.uncertainty = uncertainty_of(best.pose, best.has_other ? &best.other : nullptr);
   result.used = best.used;
   for (std::size_t k = 0; k < parts; ++k) {
-    if (best.assignment[k] == kNone) continue;
+    if (best.assignment[k] == kNoDisc) continue;
     const FittedDisc& seen = seen_[best.assignment[k]];
     result.discs[k] = {true, seen.center_px, seen.covariance_px2};
   }
-}
-
-// Whether one takes for one disc of the target what the other takes for another: where the disc that tells how it is
-// turned is hidden, the rest may fit as well in several ways.
-bool DiscMatcher::contradict(const Solution& a, const Solution& b) const {
-  for (std::size_t k = 0; k < target_.discs.size(); ++k) {
-    for (std::size_t l = 0; l < target_.discs.size(); ++l) {
-      if (k != l && a.assignment[k] != kNone && a.assignment[k] == b.assignment[l]) return true;
-    }
-  }
-  return false;
 }
 
 bool DiscMatcher::may_be(std::size_t disc, std::size_t seen) const {
@@ -165,7 +144,7 @@ bool DiscMatcher::may_be(std::size_t disc, std::size_t seen) const {
 
 // The affine map of two discs that are taken for k and l, by their shapes and their distance, and what else lies where
 // it puts the others. False where the two do not agree, or too few others do.
-bool DiscMatcher::assign_from(std::size_t i, std::size_t j, std::size_t k, std::size_t l, Assignment& assignment) {
+bool DiscMatcher::assign_from(std::size_t i, std::size_t j, std::size_t k, std::size_t l, DiscAssignment& assignment) {
   const Sym first = map_square(seen_[i], target_.discs[k]), second = map_square(seen_[j], target_.discs[l]);
   const double ratio = determinant(first) / determinant(second);
   if (!(ratio < kArea && ratio * kArea > 1)) return false;
@@ -179,7 +158,7 @@ bool DiscMatcher::assign_from(std::size_t i, std::size_t j, std::size_t k, std::
   const Vec2 wanted = less(place(target_.discs[l]), place(target_.discs[k]));
   const double c = (wanted[0] * straight[0] + wanted[1] * straight[1]) / (length * squares_m2_[k][l]);
   const double s = (wanted[0] * straight[1] - wanted[1] * straight[0]) / (length * squares_m2_[k][l]);
-  assignment.fill(kNone);
+  assignment.fill(kNoDisc);
   std::array<bool, kMostSeen> taken{};
   assignment[k] = static_cast<int>(i);
   assignment[l] = static_cast<int>(j);
@@ -203,7 +182,7 @@ bool DiscMatcher::assign_from(std::size_t i, std::size_t j, std::size_t k, std::
       least = off_m2;
       assignment[m] = static_cast<int>(n);
     }
-    if (assignment[m] == kNone) continue;
+    if (assignment[m] == kNoDisc) continue;
     taken[static_cast<std::size_t>(assignment[m])] = true;
     ++matched;
   }
@@ -211,25 +190,26 @@ bool DiscMatcher::assign_from(std::size_t i, std::size_t j, std::size_t k, std::
 }
 
 // Pairs of one target lead to the same assignment again and again.
-bool DiscMatcher::is_known(const Assignment& assignment) {
+bool DiscMatcher::is_known(const DiscAssignment& assignment) {
   const auto end = tried_.begin() + static_cast<std::ptrdiff_t>(tried_count_);
   if (std::find(tried_.begin(), end, assignment) != end) return true;
-  if (tried_count_ == kMostTried) return true;  // a frame full of discs: what has been tried must do
+  if (tried_count_ == DiscChoice::kMost) return true;  // a frame full of discs: what has been tried must do
   tried_[tried_count_++] = assignment;
   return false;
 }
 
-std::size_t DiscMatcher::gather(const Assignment& assignment,
+std::size_t DiscMatcher::gather(const DiscAssignment& assignment,
                                 std::array<SeenDisc, DiscTarget::kMostDiscs>& discs) const {
   std::size_t count = 0;
   for (std::size_t k = 0; k < target_.discs.size(); ++k) {
-    if (assignment[k] != kNone) discs[count++] = {target_.discs[k], seen_[assignment[k]]};
+    if (assignment[k] != kNoDisc) discs[count++] = {target_.discs[k], seen_[assignment[k]]};
   }
   return count;
 }
 
 // Both poses of the plane, refined, the one that fits better first.
-bool DiscMatcher::solve(const Assignment& assignment, RefinedPose& best, RefinedPose& other, bool& has_other) const {
+bool DiscMatcher::solve(const DiscAssignment& assignment, RefinedPose& best, RefinedPose& other,
+                        bool& has_other) const {
   std::array<SeenDisc, DiscTarget::kMostDiscs> discs;
   const std::size_t count = gather(assignment, discs);
   if (count < DiscTarget::kFewestDiscs) return false;
@@ -269,8 +249,8 @@ bool DiscMatcher::solve(const Assignment& assignment, RefinedPose& best, Refined
 
 // For each disc of the target the nearest of the frame's that has the place, the size and the shape that it has at the
 // pose. False where that one is a ring and should be a disc, or the other way round: the target is turned otherwise.
-bool DiscMatcher::assign_at(const Pose& pose, Assignment& assignment) const {
-  assignment.fill(kNone);
+bool DiscMatcher::assign_at(const Pose& pose, DiscAssignment& assignment) const {
+  assignment.fill(kNoDisc);
   for (std::size_t k = 0; k < target_.discs.size(); ++k) {
     Ellipse expected;
     if (!disc_ellipse(pose, target_.discs[k], expected)) continue;
@@ -279,11 +259,11 @@ bool DiscMatcher::assign_at(const Pose& pose, Assignment& assignment) const {
       const double off_px = center_error_px(seen_[n], expected);
       const double limit = kCenter_px + kCenterShare * std::sqrt(seen_[n].axes_px2[1]);
       if (!(off_px <= limit) || !same_shape(seen_[n], expected)) continue;
-      if (assignment[k] != kNone && !(off_px < least)) continue;
+      if (assignment[k] != kNoDisc && !(off_px < least)) continue;
       assignment[k] = static_cast<int>(n);
       least = off_px;
     }
-    if (assignment[k] != kNone && !may_be(k, static_cast<std::size_t>(assignment[k]))) return false;
+    if (assignment[k] != kNoDisc && !may_be(k, static_cast<std::size_t>(assignment[k]))) return false;
   }
   return true;
 }
@@ -292,13 +272,13 @@ bool DiscMatcher::assign_at(const Pose& pose, Assignment& assignment) const {
 // it passes for a disc, or nothing of the kind.
 bool DiscMatcher::mean_levels(const Solution& solution, Levels& levels) const {
   for (std::size_t k = 0; k < target_.discs.size(); ++k) {
-    if (solution.assignment[k] == kNone) continue;
+    if (solution.assignment[k] == kNoDisc) continue;
     levels.dark += seen_[solution.assignment[k]].dark / solution.used;
     levels.light += seen_[solution.assignment[k]].light / solution.used;
   }
   const double most = levels.dark + kDark * (levels.light - levels.dark);
   for (std::size_t k = 0; k < target_.discs.size(); ++k) {
-    if (solution.assignment[k] != kNone && !(seen_[solution.assignment[k]].dark < most)) return false;
+    if (solution.assignment[k] != kNoDisc && !(seen_[solution.assignment[k]].dark < most)) return false;
   }
   return true;
 }
@@ -324,15 +304,15 @@ bool DiscMatcher::looks_right(const CameraModel& camera, View2D<const u8> image,
 }
 
 // A pose from an assignment, settled with what else lies where the pose puts the discs. False where too little does.
-bool DiscMatcher::attempt(const CameraModel& camera, View2D<const u8> image, const Assignment& start,
+bool DiscMatcher::attempt(const CameraModel& camera, View2D<const u8> image, const DiscAssignment& start,
                           Solution& solution) const {
   constexpr int kRounds = 3;
-  Assignment assignment = start;
+  DiscAssignment assignment = start;
   RefinedPose& pose = solution.pose;
   bool settled = false;
   for (int round = 0; round < kRounds && !settled; ++round) {
     if (!solve(assignment, pose, solution.other, solution.has_other)) return false;
-    Assignment now{};
+    DiscAssignment now{};
     if (!assign_at(pose.pose, now)) return false;
     settled = now == assignment;
     assignment = now;
@@ -340,7 +320,7 @@ bool DiscMatcher::attempt(const CameraModel& camera, View2D<const u8> image, con
   if (!settled) return false;
   solution.assignment = assignment;
   solution.used = 0;
-  for (std::size_t k = 0; k < target_.discs.size(); ++k) solution.used += assignment[k] == kNone ? 0 : 1;
+  for (std::size_t k = 0; k < target_.discs.size(); ++k) solution.used += assignment[k] == kNoDisc ? 0 : 1;
   const bool enough = solution.used >= static_cast<int>(DiscTarget::kFewestDiscs) &&
                       2 * solution.used > static_cast<int>(target_.discs.size());
   return enough && looks_right(camera, image, solution);

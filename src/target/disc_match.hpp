@@ -5,6 +5,7 @@
 
 #include "berth/disc_target.hpp"
 #include "berth/image.hpp"
+#include "target/disc_choice.hpp"
 #include "target/disc_pose.hpp"
 
 namespace berth {
@@ -26,29 +27,26 @@ class DiscMatcher {
             DiscPose& result);
 
  private:
-  static constexpr int kNone = -1;
-  /// For each disc of the target, which of the frame's it is.
-  using Assignment = std::array<int, DiscTarget::kMostDiscs>;
   struct Solution {
-    Assignment assignment{};
+    DiscAssignment assignment{};
     int used = 0;
     RefinedPose pose, other;
     bool has_other = false;
   };
 
-  bool contradict(const Solution& a, const Solution& b) const;
   bool may_be(std::size_t disc, std::size_t seen) const;
-  bool assign_from(std::size_t i, std::size_t j, std::size_t k, std::size_t l, Assignment& assignment);
-  bool is_known(const Assignment& assignment);
-  std::size_t gather(const Assignment& assignment, std::array<SeenDisc, DiscTarget::kMostDiscs>& discs) const;
-  bool solve(const Assignment& assignment, RefinedPose& best, RefinedPose& other, bool& has_other) const;
-  bool assign_at(const Pose& pose, Assignment& assignment) const;
+  bool assign_from(std::size_t i, std::size_t j, std::size_t k, std::size_t l, DiscAssignment& assignment);
+  bool is_known(const DiscAssignment& assignment);
+  std::size_t gather(const DiscAssignment& assignment, std::array<SeenDisc, DiscTarget::kMostDiscs>& discs) const;
+  bool solve(const DiscAssignment& assignment, RefinedPose& best, RefinedPose& other, bool& has_other) const;
+  bool assign_at(const Pose& pose, DiscAssignment& assignment) const;
   struct Levels {
     double dark = 0, light = 0;
   };
   bool mean_levels(const Solution& solution, Levels& levels) const;
   bool looks_right(const CameraModel& camera, View2D<const u8> image, const Solution& solution) const;
-  bool attempt(const CameraModel& camera, View2D<const u8> image, const Assignment& start, Solution& solution) const;
+  bool attempt(const CameraModel& camera, View2D<const u8> image, const DiscAssignment& start,
+               Solution& solution) const;
 
   DiscTarget target_;
   /// Squares of the distances between the target's centres, m^2, and of each to its nearest.
@@ -56,8 +54,7 @@ class DiscMatcher {
   std::array<double, DiscTarget::kMostDiscs> nearest_m2_{};
   const FittedDisc* seen_ = nullptr;
   std::size_t count_ = 0;
-  static constexpr std::size_t kMostTried = 64;
-  std::array<Assignment, kMostTried> tried_{};
+  std::array<DiscAssignment, DiscChoice::kMost> tried_{};
   std::size_t tried_count_ = 0;
   /// Pairs of the frame that have been followed up.
   int pairs_ = 0;

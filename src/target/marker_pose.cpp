@@ -53,7 +53,7 @@ bool marker_pose(const CameraModel& camera, double size_m, const std::array<std:
     }
   }
   if (found == 0) return false;
-  if (found == 2 && refined[1].error_px < refined[0].error_px) std::swap(refined[0], refined[1]);
+  if (found == 2 && refined[1].chi_square < refined[0].chi_square) std::swap(refined[0], refined[1]);
   pose = refined[0].pose;
   const bool has_other = found == 2 && !same_pose(refined[0], refined[1]);
   uncertainty = uncertainty_of(refined[0], has_other ? &refined[1] : nullptr);

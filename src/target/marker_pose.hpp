@@ -23,8 +23,8 @@ SeenCorners seen_corners_of(double size_m, const std::array<std::array<double, 2
                             const CornerCovariance& covariance_px2);
 
 /// Pose of a square marker of side `size_m` from its corners (paper's order, px, distorted): both poses of a plane,
-/// each refined, the one that fits better, with what is known of it (docs/pose.md). Returns false when the corners are
-/// degenerate or behind the camera.
+/// each refined, the one with the smaller chi-square, with what is known of it (docs/pose.md). Returns false when the
+/// corners are degenerate or behind the camera.
 bool marker_pose(const CameraModel& camera, double size_m, const std::array<std::array<double, 2>, 4>& corners_px,
                  const CornerCovariance& covariance_px2, Pose& pose, PoseUncertainty& uncertainty);
 /// The same with one standard deviation of every coordinate, px.

@@ -75,6 +75,7 @@ PoseUncertainty uncertainty_of(const RefinedPose& found, const RefinedPose* othe
   PoseUncertainty known;
   known.covariance = found.covariance;
   known.error_px = found.error_px;
+  known.chi_square = found.chi_square;
   if (other != nullptr) {
     known.has_other = true;
     known.other = other->pose;

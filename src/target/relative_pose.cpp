@@ -42,6 +42,9 @@ Solutions solutions(const Station& station, const Detection* marker, ToRobot to_
   };
   add(marker->pose);
   if (marker->pose_uncertainty->has_other) add(marker->pose_uncertainty->other);
+  if (found.count == 2 && found.of_robot[1].chi_square < found.of_robot[0].chi_square) {
+    std::swap(found.of_robot[0], found.of_robot[1]);
+  }
   return found;
 }
 

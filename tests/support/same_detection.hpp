@@ -22,9 +22,9 @@ inline bool same_bits(const Detection& a, const Detection& b) {
   if (a.pose_uncertainty.has_value() != b.pose_uncertainty.has_value()) return false;
   if (!a.pose_uncertainty) return true;
   const PoseUncertainty &p = *a.pose_uncertainty, &q = *b.pose_uncertainty;
-  return p.covariance == q.covariance && p.error_px == q.error_px && p.has_other == q.has_other &&
-         p.other.R == q.other.R && p.other.t == q.other.t && p.other_covariance == q.other_covariance &&
-         p.other_excess == q.other_excess;
+  return p.covariance == q.covariance && p.error_px == q.error_px && p.chi_square == q.chi_square &&
+         p.has_other == q.has_other && p.other.R == q.other.R && p.other.t == q.other.t &&
+         p.other_covariance == q.other_covariance && p.other_excess == q.other_excess;
 }
 
 }  // namespace berth::test
