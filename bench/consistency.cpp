@@ -10,6 +10,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
@@ -25,6 +26,10 @@ namespace {
 struct Options {
   int frames = 100;
   std::string scenario = "scenarios/approach.toml";
+  std::vector<std::string> corpora = sim::corpus_names();
+  bool corpora_alone = false;
+  int fineness = 1;
+  bool straight_tones = false;
 };
 
 constexpr CornerMethod kGrades[] = {CornerMethod::edges, CornerMethod::photometric};
@@ -99,13 +104,20 @@ int run(int argc, char** argv) {
       "honest. In brackets the 95 % bounds of an honest mean.");
   app.add_option("--frames", options.frames, "frames a row")->check(CLI::Range(1, 100000));
   app.add_option("--scenario", options.scenario, "of the first row");
+  CLI::Option* const corpora = app.add_option("--corpora", options.corpora, "these corpora alone, and no other row")
+                                   ->delimiter(',')
+                                   ->check(CLI::IsMember(sim::corpus_names()));
+  app.add_option("--fineness", options.fineness, "of the corpora: points a pixel's side where blur is computed")
+      ->check(CLI::Range(1, 8));
+  app.add_flag("--straight-tones", options.straight_tones, "the corpora without tone curves and saturation");
   CLI11_PARSE(app, argc, argv);
+  options.corpora_alone = corpora->count() > 0;
   const std::unique_ptr<Backend> backend = open_backend("simd");
   fmt::print(
       "| frames | corners by | markers | corner RMS px | corners, mean square | pose, mean square | x, y, z, rx, ry, "
       "rz "
       "| beyond 95 %: % | ambiguous |\n|---|---|---|---|---|---|---|---|---|\n");
-  {
+  if (!options.corpora_alone) {
     const std::unique_ptr<Source> source = open_scenario(options.scenario);
     Row row(*backend, "approach");
     const std::optional<CameraModel> camera = source->camera();
@@ -113,6 +125,7 @@ int run(int argc, char** argv) {
     row.print();
   }
   for (const auto& [side, noise] : {std::array<double, 2>{20, 2}, {40, 2}, {80, 2}, {80, 8}, {160, 2}}) {
+    if (options.corpora_alone) break;
     Row row(*backend, fmt::format("{:.0f} px, noise {:.0f}", side, noise));
     for (int i = 0; i < options.frames; ++i) {
       const sim::Scene scene = sim::close_up_scene(paper_camera(), {side, noise}, i);
@@ -120,12 +133,17 @@ int run(int argc, char** argv) {
     }
     row.print();
   }
-  for (const std::string& name : sim::corpus_names()) {
+  for (const std::string& name : options.corpora) {
     Row row(*backend, name);
     std::unique_ptr<sim::Renderer> renderer;
     for (int i = 0; i < options.frames; ++i) {
-      const sim::Scene scene = sim::corpus_scene(name, i, 640, 480);
-      if (!renderer) renderer = std::make_unique<sim::Renderer>(scene.camera);
+      sim::Scene scene = sim::corpus_scene(name, i, 640, 480);
+      if (options.straight_tones) {
+        scene.sensor.gamma = 1;
+        scene.sensor.white_level = std::min(scene.sensor.white_level, 160.0);
+        scene.lighting.glares.clear();
+      }
+      if (!renderer) renderer = std::make_unique<sim::Renderer>(scene.camera, options.fineness);
       row.add(scene.camera, renderer->render(scene).view(), sim::truth(scene));
     }
     row.print();

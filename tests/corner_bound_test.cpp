@@ -66,9 +66,8 @@ table::SixAxes bound_by_images(const sim::Scene& scene) {
   }
   // Away along the ray, which leaves it where it is in the image; from that, along z.
   const Vec3 ray_to = scaled(marker.pose.t, 1 / marker.pose.t[2]);
-  add_slope(kStep_px * per_px * 2 * range_m / marker.size_m, [ray_to](sim::Scene& s, double by) {
-    s.markers[0].pose.t = add(s.markers[0].pose.t, scaled(ray_to, by));
-  });
+  add_slope(kStep_px * per_px * 2 * range_m / marker.size_m,
+            [ray_to](sim::Scene& s, double by) { s.markers[0].pose.t = add(s.markers[0].pose.t, scaled(ray_to, by)); });
   for (std::size_t i = 0; i < slopes[2].size(); ++i) {
     slopes[2][i] -= ray_to[0] * slopes[0][i] + ray_to[1] * slopes[1][i];
   }
@@ -139,7 +138,8 @@ TEST(CornerBound, IsOfTheSimulatorsImages) {
   const double range = scene.sensor.white_level - scene.sensor.black_level;
   for (int y = 0; y < scene.camera.height; ++y) {
     for (int x = 0; x < scene.camera.width; ++x) {
-      const double grey = scene.sensor.black_level + range * image[static_cast<std::size_t>(y * scene.camera.width + x)];
+      const double grey =
+          scene.sensor.black_level + range * image[static_cast<std::size_t>(y * scene.camera.width + x)];
       ASSERT_NEAR(rendered.view().row(y)[x], grey, 0.5 + 0.2) << x << ", " << y;
     }
   }

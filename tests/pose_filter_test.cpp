@@ -9,6 +9,7 @@
 #include "berth/error.hpp"
 #include "sim/geometry.hpp"
 #include "sim/random.hpp"
+#include "support/docking_approach.hpp"
 #include "support/noisy_corners.hpp"
 #include "target/marker_pose.hpp"
 #include "target/symmetric.hpp"
@@ -40,27 +41,7 @@ Detection seen(const Pose& truth, sim::Random& random, double noise_px = kNoise_
   return marker;
 }
 
-/// Closing in from 1.5 to 0.3 m in 1,000 frames, never more than 10 degrees from facing the camera.
-class Approach {
- public:
-  explicit Approach(u64 seed) : random_(seed) {
-    for (double& value : at_) value = random_.uniform(0, 6.28);
-    for (double& value : turns_) value = random_.uniform(3, 18);
-  }
-  static constexpr int kFrames = 1000;
-  Pose pose(int frame) const {
-    const double u = static_cast<double>(frame) / (kFrames - 1), z = 1.5 * std::pow(0.2, u);
-    constexpr double kTilt = 0.12;
-    return {
-        sim::rotation(kTilt * std::sin(turns_[0] * u + at_[0]), kTilt * std::sin(turns_[1] * u + at_[1]), at_[2] + u),
-        {0.1 * z * std::sin(4 * u + at_[0]), 0.08 * z * std::sin(5 * u + at_[1]), z}};
-  }
-
- private:
-  sim::Random random_;
-  std::array<double, 3> at_ = {};
-  std::array<double, 2> turns_ = {};
-};
+using test::Approach;
 
 double angle(const Pose& a, const Pose& b) {
   const auto step = step_between(a, b);

@@ -20,8 +20,7 @@ bool contradict(const DiscAssignment& a, const DiscAssignment& b) {
 bool DiscChoice::offer(const DiscAssignment& assignment, int used, double chi_square) {
   if (count_ == kMost) return false;
   const Way& best = ways_[best_];
-  const bool better =
-      count_ == 0 || used > best.used || (used == best.used && chi_square < best.chi_square);
+  const bool better = count_ == 0 || used > best.used || (used == best.used && chi_square < best.chi_square);
   ways_[count_] = {assignment, used, chi_square};
   if (better) best_ = count_;
   ++count_;
