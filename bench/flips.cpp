@@ -118,13 +118,15 @@ int run(int argc, char** argv) {
   int frames = 100000;
   std::string only;
   CLI::App app(
-      "Wrong choices between a plane's two poses, marker within 10 degrees of facing the camera, 1.5 to 0.3 m in flights "
+      "Wrong choices between a plane's two poses, marker within 10 degrees of facing the camera, 1.5 to 0.3 m in "
+      "flights "
       "of 1,000 frames: frame by frame, by the filter, and of those where it says that it is sure.");
   app.add_option("--frames", frames, "frames a row")->check(CLI::Range(1000, 10000000));
   app.add_option("--only", only, "rows whose name begins so");
   CLI11_PARSE(app, argc, argv);
   fmt::print(
-      "| marker, noise | frames | wrong, frame by frame | wrong, filtered | of these sure | frames sure, % | rotation RMS, "
+      "| marker, noise | frames | wrong, frame by frame | wrong, filtered | of these sure | frames sure, % | rotation "
+      "RMS, "
       "frame by frame ° | filtered ° |\n|---|---|---|---|---|---|---|---|\n");
   for (const Case& one : kCases) {
     if (one.name.rfind(only, 0) != 0) continue;

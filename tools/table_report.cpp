@@ -80,7 +80,8 @@ std::string axes_table(const std::vector<TableSweep>& sweeps, const MethodNames&
       // What another camera sees as well is not in the bound.
       const bool one_image = errors.corners_px.count() > 0;
       const std::string corners = one_image ? fmt::format("{:.3f}", errors.corners_px.rms()) : "–";
-      const std::string times = one_image ? fmt::format("{:.2f}", own.rms() / bound.rms(axis)) : "–";
+      const std::string times =
+          one_image && bound.count() > 0 ? fmt::format("{:.2f}", own.rms() / bound.rms(axis)) : "–";
       text += fmt::format("| {} | {} | {} | {:.3f} {} | {:.3f} {} | {} | {} | {} |\n", extent(run), methods[m],
                           found_text(errors), scale_of(axis) * own.largest(), unit_of(axis), scale_of(axis) * own.rms(),
                           unit_of(axis), shares(), corners, times);

@@ -79,6 +79,9 @@ CameraModel magnified(CameraModel camera, int factor) {
 struct Window {
   int left, top, right, bottom;
   bool empty() const { return left >= right || top >= bottom; }
+  bool holds(const Window& other) const {
+    return left <= other.left && top <= other.top && right >= other.right && bottom >= other.bottom;
+  }
   Window wider(int by, const CameraModel& camera) const {
     return {std::max(0, left - by), std::max(0, top - by), std::min(camera.width, right + by),
             std::min(camera.height, bottom + by)};
@@ -125,8 +128,14 @@ GrayImage Renderer::render(const Scene& scene) const {
   Sensor sensor = scene.sensor;
   disc_blur(radiance, camera().width, camera().height, sensor.defocus_px);
   gaussian_blur(radiance, camera().width, camera().height, sensor.blur_sigma_px);
+  std::vector<Window> refined;
   for (const Surface& surface : surfaces) {
-    if (surface.fine) refine(scene, surfaces, surface, radiance);
+    if (!surface.fine) continue;
+    // A board's squares lie on its paper.
+    const Window window = window_of(surface, camera());
+    if (std::any_of(refined.begin(), refined.end(), [&](const Window& other) { return other.holds(window); })) continue;
+    refine(scene, surfaces, surface, radiance);
+    refined.push_back(window);
   }
   sensor.blur_sigma_px = sensor.defocus_px = 0;
   return sensor_.expose(sensor, rays_, std::move(radiance), scene.seed);
