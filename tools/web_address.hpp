@@ -14,8 +14,8 @@ struct WebAddress {
 /// names the value and the remedy.
 WebAddress parse_web_address(const std::string& text);
 
-/// Whether a request's Host is one of this machine's: an address, localhost, its name, or that with ".local". Others are
-/// a stranger's page that made its own name point here.
+/// Whether a request's Host is one of this machine's: an address, localhost, its name, or that with ".local". Others
+/// are a stranger's page that made its own name point here.
 bool is_own_name(std::string host);
 
 }  // namespace berth::cli
