@@ -227,6 +227,30 @@ TEST(PipelineTracking, WindowsShareTheMemoryThatTheHostDoesNotRead) {
   EXPECT_LT(2 * (shared - whole), apart - whole);
 }
 
+TEST(PipelineTracking, ResultsHaveRoomForAsManyWindowsAsAFrameMayHave) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  DetectorConfig config;
+  config.window_sides = tracking_window_sides(kWidth, kHeight);
+  const DeviceFrame frame(*backend, kWidth, kHeight, config);
+  const TrackerConfig limits;
+  const double pixels = limits.most_share * kWidth * kHeight;
+  const std::size_t most = frame.most_in_frame(limits.most_windows, pixels);
+  EXPECT_LT(3 * most, frame.most_in_frame());
+  // Any windows that the tracker may order have room, by the lists that they have.
+  const auto slots = [](int side) { return 3 * static_cast<std::size_t>(std::max(64, side * side / 256)); };
+  for (const int a : config.window_sides) {
+    for (const int b : config.window_sides) {
+      const double rest = pixels - static_cast<double>(a) * a - static_cast<double>(b) * b;
+      if (rest < 0) continue;
+      std::size_t all = slots(a) + slots(b);
+      for (const int c : config.window_sides) {
+        if (2.0 * c * c <= rest) all = std::max(all, slots(a) + slots(b) + 2 * slots(c));
+      }
+      EXPECT_GE(most, all) << a << ", " << b;
+    }
+  }
+}
+
 /// Windows of all sides in one frame, with digests and without, on every backend: what is shared is nobody's loss.
 TEST(PipelineTracking, SharedMemoryChangesNoBit) {
   DetectorConfig config = posing();

@@ -122,8 +122,8 @@ struct HostFinish::Impl {
     if (config.corner_method == CornerMethod::photometric) fit.emplace(config.camera, width, height);
   }
 
-  void reserve(const DeviceFrame& frame, FrameResult& result) {
-    result.detections.reserve(frame.most_in_frame());
+  void reserve(const DeviceFrame& frame, FrameResult& result, std::size_t most) {
+    result.detections.reserve(most);
     result.bundles.resize(bundles.size());
     result.disc_targets.resize(config.disc_targets.size());
     found.reserve(frame.most_in_area());
@@ -294,7 +294,9 @@ HostFinish::~HostFinish() = default;
 HostFinish::HostFinish(HostFinish&&) noexcept = default;
 HostFinish& HostFinish::operator=(HostFinish&&) noexcept = default;
 
-void HostFinish::reserve(const DeviceFrame& frame, FrameResult& result) { impl_->reserve(frame, result); }
+void HostFinish::reserve(const DeviceFrame& frame, FrameResult& result, std::size_t most) {
+  impl_->reserve(frame, result, most);
+}
 void HostFinish::finish(DeviceFrame& frame, FrameResult& result) { impl_->finish(frame, result); }
 void HostFinish::give_up(FrameResult& result) {
   Impl::clear(result);

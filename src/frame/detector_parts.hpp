@@ -45,6 +45,8 @@ class DeviceFrame {
   /// The most quadrilaterals that one of the areas, and a whole frame or all windows together, can hold.
   std::size_t most_in_area() const;
   std::size_t most_in_frame() const;
+  /// The same where no more windows, and no more pixels in them, are searched at a time.
+  std::size_t most_in_frame(int most_windows, double most_pixels) const;
   /// From submit until the device was done, as far as the host has seen: where work is done while it is enqueued, the
   /// end of submit, else that of finish. ns, monotonic.
   std::int64_t submitted_ns() const { return submitted_ns_; }
@@ -79,8 +81,9 @@ class HostFinish {
   HostFinish(HostFinish&&) noexcept;
   HostFinish& operator=(HostFinish&&) noexcept;
 
-  /// A result with room for all that a frame may hold.
-  void reserve(const DeviceFrame& frame, FrameResult& result);
+  /// A result with room for `most` quadrilaterals: all that a frame may hold.
+  void reserve(const DeviceFrame& frame, FrameResult& result) { reserve(frame, result, frame.most_in_frame()); }
+  void reserve(const DeviceFrame& frame, FrameResult& result, std::size_t most);
   /// Makes the result of a frame that has arrived, its stamp left alone.
   void finish(DeviceFrame& frame, FrameResult& result);
   /// The result of a frame whose device was lost.

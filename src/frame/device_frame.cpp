@@ -130,6 +130,19 @@ std::size_t DeviceFrame::most_in_frame() const {
   return std::max(most, slots_of(whole_));
 }
 
+std::size_t DeviceFrame::most_in_frame(int most_windows, double most_pixels) const {
+  if (windows_.empty()) return slots_of(whole_);
+  // No window has more than the smallest, and so much more for each of its pixels.
+  const double least = static_cast<double>(slots_of(*windows_.back()));
+  double rate = 0;
+  for (const auto& window : windows_) {
+    const double pixels = static_cast<double>(window->place.side) * window->place.side;
+    rate = std::max(rate, (static_cast<double>(slots_of(*window)) - least) / pixels);
+  }
+  const double most = most_windows * least + rate * most_pixels;
+  return std::max(slots_of(whole_), std::min(most_in_frame(), static_cast<std::size_t>(most) + 1));
+}
+
 std::size_t DeviceFrame::device_bytes() const {
   std::size_t bytes = whole_.plan.device_bytes() + (scratch_ ? scratch_->device_bytes() : 0);
   for (const auto& window : windows_) bytes += window->plan.device_bytes();

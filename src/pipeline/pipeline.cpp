@@ -100,7 +100,7 @@ struct Pipeline::Impl {
             std::make_unique<DeviceFrame>(*backend, width, height, config.detector, config.detector.digests));
       }
       if (i == 0) host = std::make_unique<HostFinish>(width, height, config.detector);
-      host->reserve(slot.device(), slot.result);
+      host->reserve(slot.device(), slot.result, most_in_frame(slot.device(), width, height));
       slot.frame.result = &slot.result;
       slot.frame.slot = static_cast<int>(i);
       if (!tracker) continue;
@@ -113,6 +113,11 @@ struct Pipeline::Impl {
   }
 
   ~Impl() { end(); }
+
+  std::size_t most_in_frame(const DeviceFrame& device, int width, int height) const {
+    if (!config.tracking) return device.most_in_frame();
+    return device.most_in_frame(config.tracking->most_windows, config.tracking->most_share * width * height);
+  }
 
   Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
 
