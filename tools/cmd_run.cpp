@@ -165,6 +165,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       throw Error(options->record.file + ": it is the source itself; record in another file");
     }
     if (options->ros.on) options->stream.observers.push_back(make_ros_publisher(make_ros_plan(options->ros)));
+    const std::unique_ptr<Source> source = open_source(options->source);
     options->web.source = options->source;
     options->web.is_filtered = options->stream.filter;
     add_web_observers(options->web, options->stream.log == "-" ? console.err() : console.out(),
