@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <set>
 
 namespace berth::cli {
@@ -11,18 +10,22 @@ namespace {
 /// What differs from run to run: times, and what the recording itself lacks.
 const std::set<std::string> kNotCompared = {"stages_us", "laps_us", "missed"};
 
+std::string name_in(const std::string& where, const std::string& key) {
+  return where.empty() ? key : fmt::format("{}.{}", where, key);
+}
+
 std::string difference(const Json& recorded, const Json& replayed, const std::string& where) {
   if (recorded.is_object() && replayed.is_object()) {
     for (const auto& [key, value] : recorded.items()) {
-      const std::string field = where.empty() ? key : where + "." + key;
+      const std::string field = name_in(where, key);
       if (where.empty() && kNotCompared.count(key) != 0) continue;
-      if (!replayed.contains(key)) return field + " is missing, was " + to_line(value);
+      if (!replayed.contains(key)) return fmt::format("{} is missing, was {}", field, to_line(value));
       std::string inner = difference(value, replayed[key], field);
       if (!inner.empty()) return inner;
     }
     for (const auto& [key, value] : replayed.items()) {
       if (where.empty() && kNotCompared.count(key) != 0) continue;
-      if (!recorded.contains(key)) return (where.empty() ? key : where + "." + key) + " is new: " + to_line(value);
+      if (!recorded.contains(key)) return fmt::format("{} is new: {}", name_in(where, key), to_line(value));
     }
     return "";
   }
@@ -36,7 +39,7 @@ std::string difference(const Json& recorded, const Json& replayed, const std::st
   }
   // As text: the sign of a zero counts, and a number reads back as the same double.
   const std::string was = to_line(recorded), is = to_line(replayed);
-  return was == is ? "" : where + " is " + is + ", was " + was;
+  return was == is ? "" : fmt::format("{} is {}, was {}", where, is, was);
 }
 
 }  // namespace

@@ -15,8 +15,8 @@ namespace berth::mcap {
 class Problems {
  public:
   static constexpr std::size_t kKept = 20;
-  void add(std::string what) {
-    if (++count_ <= kKept) kept_.push_back(std::move(what));
+  void add(const std::string& what) {
+    if (++count_ <= kKept) kept_.push_back(what);
   }
   std::size_t count() const { return count_; }
   const std::vector<std::string>& kept() const { return kept_; }
