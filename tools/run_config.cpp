@@ -150,6 +150,7 @@ std::string explain_config(const CLI::App& run) {
     }
     if (option->get_required()) text += "; required";
     for (const CLI::Option* other : option->get_needs()) text += "; needs " + name_of(*other);
+    if (option->get_group() != "Options") text += "; under " + in_quotes(option->get_group());
     const std::string value = toml_value(*option);
     text += "\n# " + name_of(*option) + " =" + (value.empty() ? "" : " " + value) + "\n";
   }
