@@ -33,9 +33,9 @@ class CameraSource : public Source {
 
 /// A camera of Video4Linux, newest frame first: what it took while a frame was being looked at is skipped and counted.
 /// A camera that gives no frame for V4l2Options::watchdog_ms, or is gone, is complained of (Error) and opened again by
-/// its name, at most every 2 s; frames go on when it is back. Times are the driver's, clock "monotonic". The middle of
-/// the exposure is known where exposure_us is set, else it is taken for the driver's time.
-/// Throws Error when it cannot be opened the first time.
+/// its name, at most every 0.5 s; frames go on when it is back. Times are the driver's, clock "monotonic". The middle
+/// of the exposure is known where exposure_us is set, else it is taken for the driver's time. Throws Error when it
+/// cannot be opened the first time.
 std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener opener = open_v4l2_device);
 
 /// The frames of an MCAP recording (docs/recording.md). Of Berth's own they come as they came when it was made: stamp,

@@ -196,14 +196,15 @@ int V4l2Camera::take(int timeout_ms, Filled& filled) {
   filled.bytes = std::min(buffer.bytesused, buffer.length);
   filled.time_ns =
       std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 + std::int64_t{buffer.timestamp.tv_usec} * 1000;
-  filled.monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  const bool is_monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  filled.clock = is_monotonic ? "monotonic" : "driver";
   filled.from_start = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   filled.damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;
   return 0;
 }
 
 int V4l2Camera::give_back(const Filled& filled) {
-  v4l2_buffer buffer = capture_buffer(filled.index);
+  v4l2_buffer buffer = capture_buffer(static_cast<std::uint32_t>(filled.index));
   return device_->control(VIDIOC_QBUF, &buffer);
 }
 

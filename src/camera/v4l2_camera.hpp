@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "berth/image.hpp"
+#include "camera/live_camera.hpp"
 #include "camera/v4l2_device.hpp"
 
 namespace berth {
@@ -35,35 +36,20 @@ V4l2Options parse_v4l2(const std::string& text);
 std::vector<std::string> v4l2_formats();
 
 /// A camera that is streaming. Made, it is set up and all its buffers are with the driver.
-class V4l2Camera {
+class V4l2Camera final : public LiveCamera {
  public:
   /// Throws Error "PATH: …" on a device that is no camera, or does not do what the options ask.
   V4l2Camera(std::unique_ptr<V4l2Device> device, const V4l2Options& options);
 
-  /// A buffer that the driver has filled, until it is given back.
-  struct Filled {
-    std::uint32_t index = 0;
-    std::uint32_t sequence = 0;
-    std::size_t bytes = 0;
-    /// On CLOCK_MONOTONIC where `monotonic`, at the start of exposure where `from_start`, else when the frame was
-    /// there.
-    std::int64_t time_ns = 0;
-    bool monotonic = false, from_start = false;
-    /// The driver says that data are missing.
-    bool damaged = false;
-  };
-  /// Takes a filled buffer, waiting so long. Returns 0, ETIMEDOUT, or another errno: the camera is then of no more use.
-  int take(int timeout_ms, Filled& filled);
-  /// Back to the driver.
-  int give_back(const Filled& filled);
-  /// Writes the image in that buffer as 8-bit gray, width() x height(). False where it is incomplete. Allocates where
-  /// the camera compresses (MJPG).
-  bool read(const Filled& filled, View2D<u8> image) const;
+  int take(int timeout_ms, Filled& filled) override;
+  int give_back(const Filled& filled) override;
+  /// Allocates where the camera compresses (MJPG).
+  bool read(const Filled& filled, View2D<u8> image) const override;
 
-  int width() const { return width_; }
-  int height() const { return height_; }
+  int width() const override { return width_; }
+  int height() const override { return height_; }
   /// 0 where the options left it to the camera.
-  std::int64_t exposure_ns() const { return exposure_ns_; }
+  std::int64_t exposure_ns() const override { return exposure_ns_; }
 
  private:
   void check_capabilities();

@@ -1,159 +1,16 @@
-#include <algorithm>
-#include <cerrno>
-#include <chrono>
-#include <cstring>
-#include <optional>
-#include <thread>
-
-#include "berth/error.hpp"
+#include "camera/live_source.hpp"
 #include "camera/sources.hpp"
-#include "monotonic.hpp"
 
 namespace berth {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-
-constexpr milliseconds kFirstPause{50}, kLongestPause{2000};
-
-class V4l2Source final : public CameraSource {
- public:
-  V4l2Source(V4l2Options options, V4l2Opener opener) : options_(std::move(options)), opener_(std::move(opener)) {
-    open();
-  }
-
-  std::optional<SourceFrame> next() override {
-    SourceFrame frame;
-    do {
-      frame.stamp = await();
-      frame.image = GrayImage(width_, height_);
-    } while (!fetch(frame.image.view()));
-    frame.label = label_of(frame.stamp);
-    return frame;
-  }
-
-  int width() const override { return width_; }
-  int height() const override { return height_; }
-  FrameStamp await() override {
-    if (!camera_) reopen();
-    const Clock::time_point deadline = Clock::now() + milliseconds(options_.watchdog_ms);
-    for (;;) {
-      const int error = take_newest(awaited_, deadline);
-      if (error != 0 && error != ETIMEDOUT) lose(std::strerror(error));
-      if (error == 0 && !awaited_.damaged) return stamp(awaited_);
-      if (error == 0) {
-        if (const int refused = camera_->give_back(awaited_)) lose(std::strerror(refused));
-        ++health_.incomplete;
-      }
-      // A camera whose frames are all damaged is of no more use than one that gives none.
-      if (Clock::now() >= deadline) lose_for_silence();
-    }
-  }
-
-  bool fetch(View2D<u8> image) override {
-    if (image.width != width_ || image.height != height_) {
-      lose("its images are " + std::to_string(width_) + "x" + std::to_string(height_) + " now, not " +
-           std::to_string(image.width) + "x" + std::to_string(image.height) + "; say which by width and height");
-    }
-    const bool is_whole = camera_->read(awaited_, image);
-    if (const int refused = camera_->give_back(awaited_)) lose(std::strerror(refused));
-    if (is_whole) {
-      pause_ = kFirstPause;
-      incomplete_since_.reset();
-      return true;
-    }
-    ++health_.incomplete;
-    const Clock::time_point now = Clock::now();
-    if (!incomplete_since_) incomplete_since_ = now;
-    if (now - *incomplete_since_ >= milliseconds(options_.watchdog_ms)) lose_for_silence();
-    return false;
-  }
-
-  std::string label_of(const FrameStamp& stamp) const override {
-    return options_.path + "#" + std::to_string(stamp.sequence);
-  }
-
-  SourceHealth health() const override { return health_; }
-
- private:
-  void open() {
-    camera_ = std::make_unique<V4l2Camera>(opener_(options_.path), options_);
-    width_ = camera_->width();
-    height_ = camera_->height();
-    has_sequence_ = false;
-  }
-
-  void reopen() {
-    std::this_thread::sleep_for(pause_);
-    pause_ = std::min(2 * pause_, kLongestPause);
-    open();
-    ++health_.reopened;
-  }
-
-  [[noreturn]] void lose_for_silence() { lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms"); }
-
-  [[noreturn]] void lose(const std::string& why) {
-    camera_.reset();
-    incomplete_since_.reset();
-    throw Error(options_.path + ": the camera is lost (" + why + "); it is opened again as soon as it is back");
-  }
-
-  /// The last of the frames that are there, of undamaged ones if there is any; waits until then for the first.
-  int take_newest(V4l2Camera::Filled& newest, Clock::time_point deadline) {
-    const auto left = std::chrono::duration_cast<milliseconds>(deadline - Clock::now()).count();
-    if (const int error = camera_->take(static_cast<int>(std::max<std::int64_t>(left, 0)), newest)) return error;
-    count_lost(newest);
-    // At most one turn of the ring: a camera that is faster than this loop does not hold it up.
-    for (int i = 1; i < options_.buffers; ++i) {
-      V4l2Camera::Filled newer;
-      if (camera_->take(0, newer) != 0) break;
-      count_lost(newer);
-      const bool keeps = newer.damaged && !newest.damaged;
-      const V4l2Camera::Filled& other = keeps ? newer : newest;
-      ++(other.damaged ? health_.incomplete : health_.skipped);
-      if (const int error = camera_->give_back(other)) return error;
-      if (!keeps) newest = newer;
-    }
-    return 0;
-  }
-
-  void count_lost(const V4l2Camera::Filled& filled) {
-    // In 32 bits, as the driver counts; a driver that does not count, or began anew, has lost nothing.
-    const std::uint32_t gap = filled.sequence - last_sequence_ - 1;
-    if (has_sequence_ && gap < 0x80000000U) health_.lost += gap;
-    last_sequence_ = filled.sequence;
-    has_sequence_ = true;
-  }
-
-  FrameStamp stamp(const V4l2Camera::Filled& filled) {
-    const std::int64_t exposure_ns = camera_->exposure_ns();
-    FrameStamp stamp;
-    stamp.sequence = sequence_++;
-    stamp.exposure_start_ns = filled.from_start ? filled.time_ns : filled.time_ns - exposure_ns;
-    stamp.mid_exposure_ns = stamp.exposure_start_ns + exposure_ns / 2;
-    stamp.arrival_ns = monotonic_ns();
-    stamp.clock = filled.monotonic ? "monotonic" : "driver";
-    return stamp;
-  }
-
-  V4l2Options options_;
-  V4l2Opener opener_;
-  std::unique_ptr<V4l2Camera> camera_;
-  int width_ = 0, height_ = 0;
-  V4l2Camera::Filled awaited_;
-  std::optional<Clock::time_point> incomplete_since_;
-  SourceHealth health_;
-  milliseconds pause_ = kFirstPause;
-  u64 sequence_ = 0;
-  std::uint32_t last_sequence_ = 0;
-  bool has_sequence_ = false;
-};
-
-}  // namespace
 
 std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener opener) {
-  return std::make_unique<V4l2Source>(options, std::move(opener));
+  LiveOptions live;
+  live.name = options.path;
+  live.buffers = options.buffers;
+  live.watchdog_ms = options.watchdog_ms;
+  return open_live(live, [options, opener = std::move(opener)] {
+    return std::make_unique<V4l2Camera>(opener(options.path), options);
+  });
 }
 
 }  // namespace berth
