@@ -191,7 +191,7 @@ void add_calibrate(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("IMAGE", options->images, "PNG, JPEG or PNM files, or folders of them");
   command
       ->add_option("--source", options->source,
-                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE or v4l2:CAMERA instead of images")
+                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE, v4l2:CAMERA or aravis:CAMERA instead of images")
       ->type_name("SOURCE");
   command->add_option("--board", options->kind, "aprilgrid, chessboard or charuco")
       ->transform(CLI::CheckedTransformer(std::map<std::string, BoardKind>{

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "berth/backend.hpp"
+#include "camera/aravis_camera.hpp"
 #include "commands.hpp"
 #include "frame_json.hpp"
 #include "machine.hpp"
@@ -58,7 +59,7 @@ std::vector<Remedy> remedies(const std::vector<BackendStatus>& backends, const K
   return all;
 }
 
-/// Cameras of Video4Linux by names that stay the same after a restart, as --source takes them.
+/// By names that stay the same after a restart, as --source takes them. Looking into the network takes a second.
 std::vector<std::string> cameras() {
   std::vector<std::string> names;
   std::error_code error;
@@ -66,6 +67,7 @@ std::vector<std::string> cameras() {
     names.push_back("v4l2:by-path/" + entry.path().filename().string());
   }
   std::sort(names.begin(), names.end());
+  for (std::string& name : list_aravis_cameras()) names.push_back(std::move(name));
   return names;
 }
 
@@ -143,7 +145,7 @@ void print(const Json& json, std::ostream& out) {
   }
   out << "cameras, for --source\n";
   for (const Json& camera : json["cameras"]) out << "  " << text_of(camera) << '\n';
-  if (json["cameras"].empty()) out << "  none in /dev/v4l/by-path\n";
+  if (json["cameras"].empty()) out << "  none in /dev/v4l/by-path, none by Aravis\n";
   if (json["missing"].empty()) {
     out << "nothing is missing\n";
     return;

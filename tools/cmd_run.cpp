@@ -32,6 +32,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml --digests --json a.jsonl --backend opencl
   berth run --source v4l2:video0,width=640,height=480,fps=120 --camera cam.yaml --size 0.08 --filter
   berth run --source v4l2:video0,width=640,height=480,fps=120 --stream --track    at its own pace
+  berth run --source aravis:SERIAL,width=640,height=480,fps=300,exposure_us=500,packet_size=8000 --stream
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --record approach.mcap    for berth replay, Foxglove, rosbag2
   berth run --source mcap:approach.mcap --corners photometric              a recording, searched otherwise
@@ -85,7 +86,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command
       ->add_option("--source", options->source,
                    "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, mcap:FILE (a recording), v4l2:CAMERA "
-                   "(docs/cameras.md), or a path that tells")
+                   "or aravis:CAMERA (docs/cameras.md), or a path that tells")
       ->type_name("SOURCE")
       ->required();
   // Read before the command line is parsed: run_config.hpp.
@@ -143,7 +144,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->footer(kExamples);
   command->callback([options, &console, &exit_code, pipeline, stream] {
     PaceOptions& given = options->stream.pace;
-    const bool is_camera = options->source.rfind("v4l2:", 0) == 0;
+    const bool is_camera = names_camera(options->source);
     if (given.fps != 0 && is_camera) {
       throw Error(options->source +
                   ": --fps plays recordings, a camera has a pace of its own; leave --fps out, --stream takes its "
@@ -154,7 +155,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       given.stream = given.stream || set != pipeline.end();
     } else if (stream->count() > 0 || (set != pipeline.end() && given.fps == 0)) {
       throw Error((stream->count() > 0 ? "--stream" : (*set)->get_name()) +
-                  " is for a camera's frames (v4l2:); play those of a recording by --fps");
+                  " is for a camera's frames (v4l2:, aravis:); play those of a recording by --fps");
     }
     if (options->stream.track && !options->stream.engine.target_files.empty()) {
       throw Error(

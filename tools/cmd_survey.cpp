@@ -185,7 +185,9 @@ void add_survey(CLI::App& app, Console& console, int& exit_code) {
   const auto options = std::make_shared<SurveyCommand>();
   options->engine.corners = "photometric";  // here exactness counts, and time does not
   command->add_option("SOURCE", options->sources, "a scenario, video or folder, or image files: PNG, JPEG or PNM");
-  command->add_option("--source", options->source, "sim:FILE, dir:DIR, video:FILE, mcap:FILE or v4l2:CAMERA instead")
+  command
+      ->add_option("--source", options->source,
+                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE, v4l2:CAMERA or aravis:CAMERA instead")
       ->type_name("SOURCE");
   command->add_option("--camera", options->engine.camera_file, "camera file [that of the simulation]")
       ->type_name("FILE");

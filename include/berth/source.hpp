@@ -55,7 +55,8 @@ struct SourceHealth {
   u64 reopened = 0;
 };
 
-/// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`.
+/// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`,
+/// `aravis:CAMERA`.
 class Source {
  public:
   virtual ~Source() = default;

@@ -116,9 +116,7 @@ class LiveSource final : public CameraSource {
     pause_ = std::min(2 * pause_, kLongestPause);
   }
 
-  [[noreturn]] void lose_for_silence() {
-    lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms");
-  }
+  [[noreturn]] void lose_for_silence() { lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms"); }
 
   [[noreturn]] void lose(const std::string& why) {
     // One that is still being closed has had the whole life of this one for it.

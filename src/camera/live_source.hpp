@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "berth/source.hpp"
-#include "camera/sources.hpp"
 #include "camera/live_camera.hpp"
+#include "camera/sources.hpp"
 
 namespace berth {
 

@@ -14,6 +14,8 @@ bool ends_with(const std::string& text, const std::string& end) {
 
 }  // namespace
 
+bool names_camera(const std::string& spec) { return spec.rfind("v4l2:", 0) == 0 || spec.rfind("aravis:", 0) == 0; }
+
 std::unique_ptr<Source> open_source(const std::string& spec) {
   const std::size_t colon = spec.find(':');
   const std::string kind = colon == std::string::npos ? "" : spec.substr(0, colon);
@@ -24,13 +26,14 @@ std::unique_ptr<Source> open_source(const std::string& spec) {
   if (kind == "video") return open_video(rest);
   if (kind == "mcap") return open_mcap(rest);
   if (kind == "v4l2") return open_v4l2(parse_v4l2(rest));
+  if (kind == "aravis") return open_aravis(parse_aravis(rest));
 
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(spec, error);
   if (!std::filesystem::exists(status)) {
     throw Error(spec +
                 ": there is no such file or folder; give a path, or a source as sim:FILE, dir:DIR, file:IMAGE, "
-                "video:FILE, mcap:FILE or v4l2:CAMERA");
+                "video:FILE, mcap:FILE, v4l2:CAMERA or aravis:CAMERA");
   }
   if (std::filesystem::is_directory(status)) return open_images(list_images(spec, false));
   if (ends_with(spec, ".toml")) return open_scenario(spec);

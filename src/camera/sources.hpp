@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "berth/source.hpp"
+#include "camera/aravis_camera.hpp"
 #include "camera/v4l2_camera.hpp"
 
 namespace berth {
@@ -38,14 +39,21 @@ class CameraSource : public Source {
 /// cannot be opened the first time.
 std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener opener = open_v4l2_device);
 
+/// A GigE Vision or USB3 Vision camera, in all like open_v4l2. Times are on AravisOptions::time; the middle of the
+/// exposure is known unless the camera controls its exposure itself.
+std::unique_ptr<CameraSource> open_aravis(const AravisOptions& options);
+
+/// Whether it is a camera that open_source(spec) would open: a CameraSource, with a pace of its own.
+bool names_camera(const std::string& spec);
+
 /// The frames of an MCAP recording (docs/recording.md). Of Berth's own they come as they came when it was made: stamp,
 /// label and truth; of others, the images of the first topic that has any, clock "ros". What was not recorded counts as
 /// lost. Behind the last frame, damage or a missing end is an Error. Throws Error when it cannot be opened.
 std::unique_ptr<Source> open_mcap(const std::string& path);
 
-/// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`. A
-/// bare path is told by what it is: a folder, a name ending in .toml or .mcap, an image name, otherwise a video. Throws
-/// Error that lists what there is.
+/// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`,
+/// `aravis:CAMERA`. A bare path is told by what it is: a folder, a name ending in .toml or .mcap, an image name,
+/// otherwise a video. Throws Error that lists what there is.
 std::unique_ptr<Source> open_source(const std::string& spec);
 
 }  // namespace berth

@@ -1,0 +1,78 @@
+// A GigE Vision camera on 127.0.0.1, Aravis' own fake one with the serial number GV77, that shows a source's frames in
+// turn:
+//   fake_gige_camera SOURCE FRAMES [LOST [NODES]]
+// LOST is the share of packets that it loses on the way, NODES a file of GenICam nodes that it has besides its own. It
+// is there once it has written a line, and until its standard input ends.
+#include <arv.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "camera/sources.hpp"
+
+namespace {
+
+struct Show {
+  std::vector<berth::GrayImage> images;
+  std::size_t next = 0;
+};
+
+/// Aravis says that the buffer has 0 bytes; it has room for a frame of the size that the camera is set to.
+void draw(ArvBuffer* buffer, void* data, guint32, guint32, ArvPixelFormat) {
+  Show& show = *static_cast<Show*>(data);
+  const berth::GrayImage& image = show.images[show.next++ % show.images.size()];
+  std::size_t ignored = 0;
+  auto* pixels = static_cast<unsigned char*>(const_cast<void*>(arv_buffer_get_data(buffer, &ignored)));
+  int width = 0, height = 0;
+  arv_buffer_get_image_region(buffer, nullptr, nullptr, &width, &height);
+  const int columns = std::min(width, image.width());
+  for (int y = 0; y < std::min(height, image.height()); ++y) {
+    std::memcpy(pixels + static_cast<std::ptrdiff_t>(y) * width, image.view().row(y),
+                static_cast<std::size_t>(columns));
+  }
+}
+
+/// Writes the fake camera's description with these nodes beside them, and returns the file's name.
+std::string describe(const std::string& nodes) {
+  ArvFakeCamera* plain = arv_fake_camera_new("plain");
+  std::size_t bytes = 0;
+  const char* text = arv_fake_camera_get_genicam_xml(plain, &bytes);
+  std::string description(text, bytes);
+  g_object_unref(plain);
+  std::ifstream file(nodes);
+  description.insert(description.rfind("</RegisterDescription>"),
+                     std::string(std::istreambuf_iterator<char>(file), {}));
+  std::ofstream(nodes + ".xml") << description;
+  return nodes + ".xml";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc < 3) return std::fprintf(stderr, "fake_gige_camera SOURCE FRAMES [LOST [NODES]]\n"), 2;
+  Show show;
+  const auto source = berth::open_source(argv[1]);
+  for (int left = std::stoi(argv[2]); left > 0; --left) show.images.push_back(source->next().value().image);
+  const std::string description = argc > 4 ? describe(argv[4]) : "";
+  ArvGvFakeCamera* camera =
+      arv_gv_fake_camera_new_full("127.0.0.1", "GV77", description.empty() ? nullptr : description.c_str());
+  if (arv_gv_fake_camera_is_running(camera) == 0) {
+    return std::fprintf(stderr, "UDP port 3956 of 127.0.0.1 cannot be had\n"), 1;
+  }
+  if (argc > 3) g_object_set(camera, "gvsp-lost-ratio", std::stod(argv[3]), nullptr);
+  arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), draw, &show);
+  std::puts("ready");
+  std::fflush(stdout);
+  while (std::getchar() != EOF) {
+  }
+  g_object_unref(camera);
+  return 0;
+} catch (const std::exception& error) {
+  return std::fprintf(stderr, "%s\n", error.what()), 2;
+}
