@@ -149,7 +149,7 @@ TEST_F(Aravis, OpensACameraAgainThatWasKilled) {
   camera.reset();
   const auto next_complaint = [&] {
     for (;;) {
-      const std::string text = complaint([&] { source->next(); });
+      std::string text = complaint([&] { source->next(); });
       if (!text.empty()) return text;
     }
   };
@@ -172,8 +172,6 @@ TEST_F(Aravis, SaysWhatTheCameraDoesNotDo) {
   EXPECT_THAT(refusal(",gain=500"), AllOf(HasSubstr("gain from"), HasSubstr("500")));
   EXPECT_THAT(refusal(",trigger=Line9"), HasSubstr("trigger=Line9"));
   EXPECT_THAT(refusal(",time=ptp"), HasSubstr("no PTP"));
-  const auto other = open_source("aravis:127.0.0.1");
-  EXPECT_THAT(refusal(""), HasSubstr("another program"));
 }
 
 TEST_F(Aravis, WaitsForATrigger) {
@@ -197,9 +195,10 @@ TEST_F(Aravis, TakesTimesFromTheCamera) {
   std::vector<std::string> with_nodes = arguments();
   with_nodes.push_back(nodes);
   const FakeGigeProcess camera(with_nodes);
-  for (const std::string clock : {"ptp", "camera"}) {
-    const SourceFrame frame = *open_source(kCamera + ",exposure_us=4000,time=" + clock)->next();
-    EXPECT_EQ(frame.stamp.clock, clock);
+  for (const char* clock : {"ptp", "camera"}) {
+    const auto source = open_source((kCamera + ",exposure_us=4000,time=").append(clock));
+    const SourceFrame frame = *source->next();
+    EXPECT_STREQ(frame.stamp.clock, clock);
     EXPECT_GT(frame.stamp.exposure_start_ns, 0);
     EXPECT_EQ(frame.stamp.mid_exposure_ns - frame.stamp.exposure_start_ns, 2'000'000);
   }
