@@ -384,8 +384,9 @@ TEST(Record, AtACamerasPaceToo) {
   EXPECT_GT(records[0]["laps_us"]["latency"], 0);
 
   // Windows that went by results of frames before the last one.
-  const CommandRun tracked = run_berth({"run", "--source", "sim:" + (folder / "s.toml"), "--record", folder / "b.mcap",
-                                        "--fps", "50", "--track", "--filter"});
+  const CommandRun tracked =
+      run_berth({"run", "--source", "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml", "--max-frames", "20", "--record",
+                 folder / "b.mcap", "--fps", "50", "--track", "--filter"});
   ASSERT_EQ(tracked.exit_code, 0) << tracked.err;
   EXPECT_THAT(tracked.out, HasSubstr("in windows"));
   const CommandRun again = run_berth({"replay", folder / "b.mcap"});
