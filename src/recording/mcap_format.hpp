@@ -156,6 +156,34 @@ class FieldReader {
   bool ok_ = true;
 };
 
+/// A record as it stands among those of a chunk.
+struct Record {
+  Op op = Op::header;
+  const u8* content = nullptr;
+  std::size_t size = 0;
+};
+
+/// Takes the next record off the front. False at the end, and where what is left is damaged and holds none.
+inline bool next_record(FieldReader& records, Record& record) {
+  if (records.left() < kRecordHead) return false;
+  record.op = static_cast<Op>(records.number<u8>());
+  record.size = records.number<u64>();
+  record.content = records.take(record.size);
+  return record.content != nullptr;
+}
+
+/// Its bytes stay where they are.
+inline Message message_of(FieldReader& fields) {
+  Message message;
+  message.channel = fields.number<u16>();
+  message.sequence = fields.number<u32>();
+  message.log_time = fields.number<u64>();
+  message.publish_time = fields.number<u64>();
+  message.data = fields.rest();
+  message.size = fields.left();
+  return message;
+}
+
 inline Schema schema_of(FieldReader& fields) {
   Schema schema;
   schema.id = fields.number<u16>();

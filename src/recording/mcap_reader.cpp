@@ -68,14 +68,8 @@ bool Reader::advance() {
   return false;
 }
 
-const Message* Reader::message_of(const u8* content, std::size_t size) {
-  FieldReader fields(content, size);
-  message_.channel = fields.number<u16>();
-  message_.sequence = fields.number<u32>();
-  message_.log_time = fields.number<u64>();
-  message_.publish_time = fields.number<u64>();
-  message_.data = fields.rest();
-  message_.size = fields.left();
+const Message* Reader::take_message(FieldReader fields) {
+  message_ = message_of(fields);
   return fields.ok() ? &message_ : nullptr;
 }
 
@@ -85,25 +79,21 @@ const Message* Reader::next() {
     if (loose_) {
       if (at_++ > 0) continue;
       const Bytes& content = scan_.content();
-      if (const Message* message = message_of(content.data(), content.size())) return message;
+      if (const Message* message = take_message({content.data(), content.size()})) return message;
       continue;
     }
-    while (records_.size() - at_ >= kRecordHead) {
-      FieldReader fields(records_.data() + at_, records_.size() - at_);
-      const Op op = static_cast<Op>(fields.number<u8>());
-      const u64 length = fields.number<u64>();
-      const u8* const content = fields.take(length);
-      if (content == nullptr) break;
-      at_ = records_.size() - fields.left();
-      FieldReader inner(content, static_cast<std::size_t>(length));
-      if (op == Op::message) {
-        if (const Message* message = message_of(content, static_cast<std::size_t>(length))) return message;
-      } else if (op == Op::schema) {
-        Schema schema = schema_of(inner);
-        if (inner.ok()) schemas_.emplace(schema.id, std::move(schema));
-      } else if (op == Op::channel) {
-        Channel channel = channel_of(inner);
-        if (inner.ok()) channels_.emplace(channel.id, std::move(channel));
+    FieldReader left(records_.data() + at_, records_.size() - at_);
+    for (Record record; next_record(left, record);) {
+      at_ = records_.size() - left.left();
+      FieldReader fields(record.content, record.size);
+      if (record.op == Op::message) {
+        if (const Message* message = take_message(fields)) return message;
+      } else if (record.op == Op::schema) {
+        Schema schema = schema_of(fields);
+        if (fields.ok()) schemas_.emplace(schema.id, std::move(schema));
+      } else if (record.op == Op::channel) {
+        Channel channel = channel_of(fields);
+        if (fields.ok()) channels_.emplace(channel.id, std::move(channel));
       }
     }
     if (at_ < records_.size()) problems_.add("the chunk at byte " + std::to_string(scan_.offset()) + " ends in damage");

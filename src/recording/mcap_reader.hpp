@@ -36,7 +36,7 @@ class Reader {
   /// Goes on to the next chunk or message outside of one; false at the end.
   bool advance();
   void take_side_record();
-  const Message* message_of(const u8* content, std::size_t size);
+  const Message* take_message(FieldReader fields);
 
   RecordScan scan_;
   ChunkCodec codec_;

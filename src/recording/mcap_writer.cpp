@@ -155,15 +155,11 @@ void Writer::end_chunk() {
 Writer::ChunkIndex Writer::look_through(const Bytes& records, ChunkPlace& place) {
   ChunkIndex index;
   bool any = false;
-  FieldReader reader(records.data(), records.size());
-  while (reader.left() >= kRecordHead) {
-    const u64 at = records.size() - reader.left();
-    const Op op = static_cast<Op>(reader.number<u8>());
-    const u64 length = reader.number<u64>();
-    const u8* const content = reader.take(length);
-    if (content == nullptr) break;
-    FieldReader fields(content, static_cast<std::size_t>(length));
-    if (op == Op::message) {
+  FieldReader left(records.data(), records.size());
+  u64 at = 0;
+  for (Record record; next_record(left, record); at = records.size() - left.left()) {
+    FieldReader fields(record.content, record.size);
+    if (record.op == Op::message) {
       const u16 channel = fields.number<u16>();
       fields.number<u32>();
       const u64 time = fields.number<u64>();
@@ -172,10 +168,10 @@ Writer::ChunkIndex Writer::look_through(const Bytes& records, ChunkPlace& place)
       place.start_time = any ? std::min(place.start_time, time) : time;
       place.end_time = any ? std::max(place.end_time, time) : time;
       any = true;
-    } else if (op == Op::schema) {
+    } else if (record.op == Op::schema) {
       Schema schema = schema_of(fields);
       if (fields.ok()) schemas_.emplace(schema.id, std::move(schema));
-    } else if (op == Op::channel) {
+    } else if (record.op == Op::channel) {
       Channel channel = channel_of(fields);
       if (fields.ok()) channels_.emplace(channel.id, std::move(channel));
     }

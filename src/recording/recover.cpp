@@ -81,14 +81,8 @@ class Walk {
   }
 
   bool take_message(FieldReader& fields) {
-    Message message;
-    message.channel = fields.number<u16>();
-    message.sequence = fields.number<u32>();
-    message.log_time = fields.number<u64>();
-    message.publish_time = fields.number<u64>();
+    const Message message = message_of(fields);
     if (!fields.ok()) return false;
-    message.data = fields.rest();
-    message.size = fields.left();
     count(message.channel);
     // In a chunk of its own, or none would be found by an index.
     if (to_ != nullptr) {
@@ -106,20 +100,16 @@ class Walk {
       return;
     }
     ++found_.chunks;
-    FieldReader reader(records_.data(), records_.size());
-    while (reader.left() >= kRecordHead) {
-      const Op op = static_cast<Op>(reader.number<u8>());
-      const u64 length = reader.number<u64>();
-      const u8* const record = reader.take(length);
-      if (record == nullptr) break;
-      FieldReader fields(record, static_cast<std::size_t>(length));
-      if (op == Op::channel) {
+    FieldReader left(records_.data(), records_.size());
+    for (Record record; next_record(left, record);) {
+      FieldReader fields(record.content, record.size);
+      if (record.op == Op::channel) {
         const Channel channel = channel_of(fields);
         if (fields.ok()) topics_.emplace(channel.id, channel.topic);
-      } else if (op == Op::schema) {
+      } else if (record.op == Op::schema) {
         const Schema schema = schema_of(fields);
         if (fields.ok()) schemas_.insert(schema.id);
-      } else if (op == Op::message) {
+      } else if (record.op == Op::message) {
         const u16 channel = fields.number<u16>();
         if (fields.ok()) count(channel);
       }
