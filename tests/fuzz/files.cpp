@@ -1,10 +1,7 @@
-// Every file that Berth reads. A file that is read holds what its reader promises.
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <unistd.h>
-
+// The files that Berth reads, but for recordings. A file that is read holds what its reader promises.
 #include <cmath>
 #include <string>
+#include <string_view>
 
 #include "berth/bundle.hpp"
 #include "berth/camera.hpp"
@@ -16,40 +13,21 @@
 #include "fuzz/targets.hpp"
 #include "navigation/network.hpp"
 #include "sim/scenario.hpp"
+#include "support/memory_file.hpp"
 #include "work/machine.hpp"
 
 namespace berth::fuzz {
 namespace {
 
-const std::string kFolder = "/proc/self/fd/";
-
-/// The bytes as a file that has a path, in memory.
-class MemoryFile {
- public:
-  MemoryFile(const u8* bytes, std::size_t count) : descriptor_(memfd_create("fuzz", 0)) {
-    require(descriptor_ >= 0, "a file in memory can be made");
-    require(::write(descriptor_, bytes, count) == static_cast<ssize_t>(count), "it can be written");
-    path_ = kFolder + std::to_string(descriptor_);
-  }
-  ~MemoryFile() { close(descriptor_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-
-  const std::string& path() const { return path_; }
-
- private:
-  int descriptor_;
-  std::string path_;
-};
-
 template <typename Read>
 void read_as_file(const u8* bytes, std::size_t count, const Read& read) {
-  const MemoryFile file(bytes, count);
+  test::MemoryFile file;
+  file.fill(std::string_view(reinterpret_cast<const char*>(bytes), count));
   try {
     read(file.path());
   } catch (const Error& error) {
     // This file, or one beside it that it refers to.
-    if (std::string(error.what()).find(kFolder) == std::string::npos) require(false, error.what());
+    if (std::string(error.what()).find("/proc/self/fd/") == std::string::npos) require(false, error.what());
   }
 }
 

@@ -1,32 +1,35 @@
 // Whatever bytes a recording holds: reading it ends, and touches no memory but its own. Recovering it makes a whole
 // file.
-#include <cstdlib>
 #include <string>
 
 #include "berth/error.hpp"
+#include "fuzz/targets.hpp"
 #include "recording/cdr_reader.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/recover.hpp"
 #include "support/memory_file.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
+namespace berth::fuzz {
+
+void recording_file(const u8* bytes, std::size_t count) {
   // Behind the magic everything is open: nothing is gained by guessing that.
-  std::string bytes(berth::mcap::kMagic.begin(), berth::mcap::kMagic.end());
-  bytes.append(reinterpret_cast<const char*>(data), size);
-  berth::test::MemoryFile file, saved;
-  file.fill(bytes);
-  berth::mcap::Reader reader(file.path());
-  while (const berth::mcap::Message* message = reader.next()) {
-    berth::CdrReader fields(message->data, message->size);
+  std::string content(mcap::kMagic.begin(), mcap::kMagic.end());
+  content.append(reinterpret_cast<const char*>(bytes), count);
+  test::MemoryFile file, saved;
+  file.fill(content);
+  mcap::Reader reader(file.path());
+  while (const mcap::Message* message = reader.next()) {
+    CdrReader fields(message->data, message->size);
     while (fields.ok()) fields.string();
     reader.schema_of_channel(message->channel);
   }
   try {
-    berth::mcap::recover(file.path(), saved.path(), "fuzz");
-  } catch (const berth::Error&) {
-    return 0;  // nothing whole in it
+    mcap::recover(file.path(), saved.path(), "fuzz");
+  } catch (const Error&) {
+    return;  // nothing whole in it
   }
-  const berth::mcap::Recovery again = berth::mcap::examine(saved.path());
-  if (!again.whole || again.messages == 0) std::abort();
-  return 0;
+  const mcap::Recovery again = mcap::examine(saved.path());
+  require(again.whole && again.messages > 0, "what was recovered is a whole file");
 }
+
+}  // namespace berth::fuzz

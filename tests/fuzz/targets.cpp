@@ -1,8 +1,5 @@
 #include "fuzz/targets.hpp"
 
-#include <cstdio>
-#include <cstdlib>
-
 namespace berth::fuzz {
 
 const std::vector<Target>& targets() {
@@ -13,17 +10,12 @@ const std::vector<Target>& targets() {
       {"scenario_file", scenario_file, {"scenarios/*.toml"}, 24},
       {"machine_file", machine_file, {"bench/machines/*.toml"}},
       {"network_file", network_file, {"training/tests/data/tiny.berthnet"}},
+      {"recording_file", recording_file, {}},
       {"image_file", image_file, {"tests/data/tag36h11_7.png"}},
       {"camera_pixels", camera_pixels, {}},
       {"marker_frame", marker_frame, {}, 120},
   };
   return all;
-}
-
-void require(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "does not hold: %s\n", what);
-  std::abort();
 }
 
 }  // namespace berth::fuzz

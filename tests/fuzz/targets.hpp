@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -23,7 +25,11 @@ struct Target {
 const std::vector<Target>& targets();
 
 /// Ends the program, saying why; for what must hold whatever the input.
-void require(bool holds, const char* what);
+inline void require(bool holds, const char* what) {
+  if (holds) return;
+  std::fprintf(stderr, "does not hold: %s\n", what);
+  std::abort();
+}
 
 void camera_file(const u8* bytes, std::size_t count);
 void bundle_file(const u8* bytes, std::size_t count);
@@ -31,6 +37,7 @@ void disc_target_file(const u8* bytes, std::size_t count);
 void scenario_file(const u8* bytes, std::size_t count);
 void machine_file(const u8* bytes, std::size_t count);
 void network_file(const u8* bytes, std::size_t count);
+void recording_file(const u8* bytes, std::size_t count);
 void image_file(const u8* bytes, std::size_t count);
 void camera_pixels(const u8* bytes, std::size_t count);
 void marker_frame(const u8* bytes, std::size_t count);
