@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "as_mat.hpp"
 #include "berth/error.hpp"
+#include "camera/image_file.hpp"
 #include "sim/corpus.hpp"
 #include "sim/random.hpp"
 #include "target/marker_pattern.hpp"
@@ -161,17 +162,27 @@ cv::Mat text(Sheet& sheet) {
   return turned;
 }
 
-/// Chessboards, windows, nested squares, bars and dots: regular squares, seen at a slant.
-cv::Mat grids(Sheet& sheet) {
+/// A few squares of two tones, `least` px wide and more, each as `draw` makes it of them.
+template <typename Draw>
+cv::Mat squares(Sheet& sheet, double least, const Draw& draw) {
   cv::Mat image = sheet.ground();
   const int things = sheet.random.integer(1, 6);
   for (int i = 0; i < things; ++i) {
     const double dark = sheet.random.uniform(5, 120);
     const double light = dark + sheet.random.uniform(20, 130);
+    const cv::Mat square = draw(dark, light);
+    sheet.place(image, square, sheet.random.uniform(least, 0.9 * sheet.size.height));
+  }
+  return image;
+}
+
+/// Chessboards, windows, nested squares, bars and dots: regular squares, seen at a slant.
+cv::Mat grids(Sheet& sheet) {
+  return squares(sheet, 24, [&](double dark, double light) {
     const int n = sheet.random.integer(4, 14);
     const int kind = sheet.random.integer(0, 4);
     const int period = sheet.random.integer(2, 4);
-    const cv::Mat square = cells(n, [&](int x, int y) {
+    return cells(n, [&](int x, int y) {
       const int ring = std::min({x, y, n - 1 - x, n - 1 - y});
       const bool lit = kind == 0   ? (x + y) % 2 == 0
                        : kind == 1 ? x % period == 0 || y % period == 0
@@ -180,24 +191,16 @@ cv::Mat grids(Sheet& sheet) {
                                    : x % period != 0 && y % period != 0;
       return lit ? light : dark;
     });
-    sheet.place(image, square, sheet.random.uniform(24, 0.9 * sheet.size.height));
-  }
-  return image;
+  });
 }
 
 /// Random cells without a border around them, as in crosswords and the codes of other makes.
 cv::Mat random_cells(Sheet& sheet) {
-  cv::Mat image = sheet.ground();
-  const int things = sheet.random.integer(1, 6);
-  for (int i = 0; i < things; ++i) {
-    const double dark = sheet.random.uniform(5, 120);
-    const double light = dark + sheet.random.uniform(20, 130);
+  return squares(sheet, 40, [&](double dark, double light) {
     const double share = sheet.random.uniform(0.2, 0.8);
-    const cv::Mat square = cells(sheet.random.integer(8, 33),
-                                 [&](int /*x*/, int /*y*/) { return sheet.random.chance(share) ? light : dark; });
-    sheet.place(image, square, sheet.random.uniform(40, 0.9 * sheet.size.height));
-  }
-  return image;
+    return cells(sheet.random.integer(8, 33),
+                 [&](int /*x*/, int /*y*/) { return sheet.random.chance(share) ? light : dark; });
+  });
 }
 
 /// Markers of one family, on their light margin.
@@ -221,11 +224,10 @@ cv::Mat markers(Sheet& sheet, const MarkerFamily& family) {
 
 /// A part of a photograph, turned, mirrored, and lit otherwise.
 cv::Mat cut(Sheet& sheet, const GrayImage& photo) {
-  const View2D<const u8> view = photo.view();
-  const cv::Mat whole(view.height, view.width, CV_8U, const_cast<u8*>(view.row(0)),
-                      static_cast<std::size_t>(view.stride));
-  const cv::Point2f middle(static_cast<float>(sheet.random.uniform(0, view.width)),
-                           static_cast<float>(sheet.random.uniform(0, view.height)));
+  const cv::Mat whole = as_mat(photo.view());
+  const double x = sheet.random.uniform(0, whole.cols);
+  const double y = sheet.random.uniform(0, whole.rows);
+  const cv::Point2f middle(static_cast<float>(x), static_cast<float>(y));
   const double angle = sheet.random.uniform(0, 360);
   const double scale = sheet.random.uniform(0.4, 2.5);
   cv::Mat to_image = cv::getRotationMatrix2D(middle, angle, scale);
@@ -234,23 +236,17 @@ cv::Mat cut(Sheet& sheet, const GrayImage& photo) {
   cv::Mat image;
   cv::warpAffine(whole, image, to_image, sheet.size, cv::INTER_LINEAR, cv::BORDER_REFLECT);
   if (sheet.random.chance(0.5)) cv::flip(image, image, 1);
-  image.convertTo(image, CV_32F, sheet.random.uniform(0.3, 1.3), sheet.random.uniform(-20, 40));
+  const double gain = sheet.random.uniform(0.3, 1.3);
+  const double offset = sheet.random.uniform(-20, 40);
+  image.convertTo(image, CV_32F, gain, offset);
   return image;
-}
-
-GrayImage read_photo(const std::string& path) {
-  const cv::Mat photo = cv::imread(path, cv::IMREAD_GRAYSCALE);
-  if (photo.empty()) throw Error(path + ": no picture that can be read; give PNG, JPEG or PGM files");
-  GrayImage gray(photo.cols, photo.rows);
-  for (int y = 0; y < photo.rows; ++y) std::copy_n(photo.ptr<u8>(y), photo.cols, gray.view().row(y));
-  return gray;
 }
 
 }  // namespace
 
 EmptyPictures::EmptyPictures(std::vector<const MarkerFamily*> families, const std::vector<std::string>& photos)
     : families_(std::move(families)), kinds_({"noise", "texture", "text", "grids", "cells", "families", "room"}) {
-  for (const std::string& path : photos) photos_.push_back(read_photo(path));
+  for (const std::string& path : photos) photos_.push_back(read_gray_image(path));
   if (!photos_.empty()) kinds_.emplace_back("photos");
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "as_mat.hpp"
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
 #include "berth/error.hpp"
@@ -102,9 +103,7 @@ class ArucoEngine final : public Engine {
   }
   const std::string& name() const override { return name_; }
   void run(View2D<const u8> image) override {
-    const cv::Mat view(image.height, image.width, CV_8UC1, const_cast<u8*>(image.data),
-                       static_cast<std::size_t>(image.stride));
-    cv::aruco::detectMarkers(view, dictionary_, corners_, ids_, parameters_);
+    cv::aruco::detectMarkers(as_mat(image), dictionary_, corners_, ids_, parameters_);
   }
   std::vector<Found> found() const override {
     std::vector<Found> all;

@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -13,8 +12,10 @@
 #include <sstream>
 #include <thread>
 
+#include "as_mat.hpp"
 #include "berth/detector.hpp"
 #include "berth/error.hpp"
+#include "camera/image_file.hpp"
 #include "clock.hpp"
 #include "empty_pictures.hpp"
 #include "frame/detector_parts.hpp"
@@ -137,9 +138,7 @@ class Examiner {
     for (const Detection& found : detections) {
       const std::string path =
           fmt::format("{}/{}-{}-{}-{}bits.png", options_.evidence, name, found.family->name, found.id, found.hamming);
-      const View2D<const u8> view = picture.image.view();
-      cv::imwrite(path, cv::Mat(view.height, view.width, CV_8U, const_cast<u8*>(view.row(0)),
-                                static_cast<std::size_t>(view.stride)));
+      cv::imwrite(path, as_mat(picture.image.view()));
     }
   }
 
@@ -248,8 +247,7 @@ int run(int argc, char** argv) {
   CLI::App app("How often a marker is seen where none is, each family by itself, at the default settings.");
   app.add_option("--backend", options.backend, "where frames are searched");
   app.add_option("--families", options.families, "families to look for")->delimiter(',');
-  app.add_option("--photos", photo_folder,
-                 "folder of photographs without markers (.png, .jpg, .pgm); parts of them are pictures, too")
+  app.add_option("--photos", photo_folder, "folder of photographs without markers; parts of them are pictures, too")
       ->check(CLI::ExistingDirectory);
   app.add_option("--file", options.file, "what is done, a line for each thousand pictures; goes on there");
   app.add_option("--evidence", options.evidence, "folder for the pictures in which something was seen")
@@ -257,14 +255,7 @@ int run(int argc, char** argv) {
   app.add_option("--frames", options.frames, "pictures in all")->check(CLI::Range(1L, 1000000000L));
   app.add_option("--threads", options.threads, "working at a time")->check(CLI::Range(1, 256));
   CLI11_PARSE(app, argc, argv);
-  if (!photo_folder.empty()) {
-    for (const auto& entry : std::filesystem::directory_iterator(photo_folder)) {
-      const std::string suffix = entry.path().extension().string();
-      if (suffix == ".png" || suffix == ".jpg" || suffix == ".pgm") options.photos.push_back(entry.path().string());
-    }
-    if (options.photos.empty()) throw Error(photo_folder + " has no .png, .jpg or .pgm file; give photographs");
-    std::sort(options.photos.begin(), options.photos.end());
-  }
+  if (!photo_folder.empty()) options.photos = list_images(photo_folder, false);
   Counts done = read_done(options);
   examine_all(options, done);
   print_table(options, done);

@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "as_mat.hpp"
 #include "berth/camera.hpp"
 #include "sim/render.hpp"
 #include "support/command_run.hpp"
@@ -33,7 +34,7 @@ TEST(CliTarget, DetectGivesItsPose) {
   const GrayImage image = sim::render(test::target_scene(camera, target, truth, 0.6, 2, 3));
   const View2D<const u8> view = image.view();
   const std::string file = folder / "port.png";
-  ASSERT_TRUE(cv::imwrite(file, cv::Mat(view.height, view.width, CV_8U, const_cast<u8*>(view.data))));
+  ASSERT_TRUE(cv::imwrite(file, as_mat(view)));
   write_camera_info(folder / "cam.yaml", camera);
 
   const CommandRun run = run_berth(

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "as_mat.hpp"
 #include "output_file.hpp"
 
 namespace berth::cli {
@@ -23,10 +24,8 @@ class Canvas {
   explicit Canvas(View2D<const u8> image) {
     const int side = std::max(image.width, image.height);
     enlargement_ = std::clamp((kReadableSide + side - 1) / side, 1, 8);
-    const cv::Mat gray(image.height, image.width, CV_8U, const_cast<u8*>(image.data),
-                       static_cast<std::size_t>(image.stride));
     cv::Mat large;
-    cv::resize(gray, large, cv::Size(), enlargement_, enlargement_, cv::INTER_NEAREST);
+    cv::resize(as_mat(image), large, cv::Size(), enlargement_, enlargement_, cv::INTER_NEAREST);
     cv::cvtColor(large, picture_, cv::COLOR_GRAY2BGR);
     thickness_ = std::max(1, cvRound(side * enlargement_ / 900.0));
     text_px_ = 12.0 * std::max(1.0, side * enlargement_ / 1200.0);

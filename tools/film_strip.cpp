@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "as_mat.hpp"
 #include "output_file.hpp"
 #include "pose_algebra.hpp"
 
@@ -21,10 +22,8 @@ void write_text(cv::Mat& picture, const std::string& text, cv::Point at) {
 }  // namespace
 
 void FilmStrip::add(View2D<const u8> image, const PilotFrame& found, const std::string& caption) {
-  const cv::Mat grey(image.height, image.width, CV_8U, const_cast<u8*>(image.data),
-                     static_cast<std::size_t>(image.stride));
   cv::Mat picture;
-  cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
+  cv::cvtColor(as_mat(image), picture, cv::COLOR_GRAY2BGR);
   if (found.has_position && !found.from_marker) {
     const auto& p = found.position_m;
     const auto at = image_of(camera_, p);

@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
+#include "as_mat.hpp"
 #include "berth/error.hpp"
 #include "camera/recorded_frame.hpp"
 #include "frame_record.hpp"
@@ -87,9 +88,7 @@ void RecordingFile::write_picture(View2D<const u8> image, std::int64_t stamp_ns)
   if (pictures_ == RecordPictures::raw) {
     ros2::write(ros2::Image{header, image}, cdr_);
   } else {
-    const cv::Mat pixels(image.height, image.width, CV_8UC1, const_cast<u8*>(image.data),
-                         static_cast<std::size_t>(image.stride));
-    if (!cv::imencode(".png", pixels, png_, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
+    if (!cv::imencode(".png", as_mat(image), png_, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
       throw Error("a frame cannot be encoded as PNG; record raw pictures");
     }
     ros2::write(ros2::CompressedImage{header, "png", png_}, cdr_);

@@ -6,6 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "as_mat.hpp"
 #include "berth/detector.hpp"
 #include "calibration/edge_width.hpp"
 
@@ -26,10 +27,6 @@ bool spans_a_plane(const std::vector<std::array<double, 2>>& places, const Board
     if (!(high - low > 1.5 * pitch_m)) return false;
   }
   return true;
-}
-
-cv::Mat as_mat(View2D<const u8> image) {
-  return cv::Mat(image.height, image.width, CV_8U, const_cast<u8*>(image.data), static_cast<std::size_t>(image.stride));
 }
 
 void add_point(BoardView& view, std::size_t point, double x_px, double y_px) {
