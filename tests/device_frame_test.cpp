@@ -7,6 +7,7 @@
 #include "monotonic.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
+#include "support/forwarding_backend.hpp"
 
 namespace berth {
 namespace {
@@ -17,47 +18,33 @@ struct Lazy {
   std::int64_t began_ns = 0;
 };
 
-class LazyStream final : public Stream {
+class LazyStream final : public test::ForwardingStream {
  public:
-  LazyStream(std::unique_ptr<Stream> behind, Lazy& lazy) : behind_(std::move(behind)), lazy_(lazy) {}
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
-  void download(Buffer& buffer, void* data, std::size_t bytes) override { behind_->download(buffer, data, bytes); }
+  LazyStream(std::unique_ptr<Stream> behind, Lazy& lazy) : ForwardingStream(std::move(behind)), lazy_(lazy) {}
   void replay(Plan& plan) override {
     plans_.push_back(&plan);
     lazy_.is_flushed = false;
   }
   void flush() override { lazy_.is_flushed = true; }
-  std::unique_ptr<Event> record_event() override { return behind_->record_event(); }
+  bool is_immediate() const override { return false; }
   bool finish() override {
     lazy_.began_ns = monotonic_ns();
-    for (Plan* plan : plans_) behind_->replay(*plan);
+    for (Plan* plan : plans_) behind().replay(*plan);
     plans_.clear();
-    return behind_->finish();
+    return behind().finish();
   }
 
  private:
-  std::unique_ptr<Stream> behind_;
   Lazy& lazy_;
   std::vector<Plan*> plans_;
 };
 
-class LazyBackend final : public Backend {
- public:
-  explicit LazyBackend(Lazy& lazy) : behind_(open_backend("simd")), lazy_(lazy) {}
-  const char* name() const override { return "lazy"; }
-  DeviceInfo device() const override { return behind_->device(); }
-  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_->make_buffer(bytes); }
-  std::unique_ptr<Stream> make_stream() override { return std::make_unique<LazyStream>(behind_->make_stream(), lazy_); }
-  std::unique_ptr<Plan> record(const std::vector<Step>& steps) override { return behind_->record(steps); }
-
- private:
-  std::unique_ptr<Backend> behind_;
-  Lazy& lazy_;
-};
-
 TEST(DeviceFrame, IsDoneWhenTheDeviceIsNotWhenTheFrameIsEnqueued) {
   Lazy lazy;
-  LazyBackend backend(lazy);
+  const std::unique_ptr<Backend> simd = open_backend("simd");
+  test::ForwardingBackend backend("lazy", *simd, [&](std::unique_ptr<Stream> behind) {
+    return std::make_unique<LazyStream>(std::move(behind), lazy);
+  });
   DetectorConfig config;
   config.window_sides = {208};
   DeviceFrame frame(backend, 640, 480, config);

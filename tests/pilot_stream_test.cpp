@@ -14,6 +14,7 @@
 #include "sim/render.hpp"
 #include "support/counted_allocations.hpp"
 #include "support/faulty_backend.hpp"
+#include "support/forwarding_backend.hpp"
 
 namespace berth {
 namespace {
@@ -152,45 +153,26 @@ struct Gate {
   }
 };
 
-class GatedStream final : public Stream {
+class GatedStream final : public test::ForwardingStream {
  public:
-  GatedStream(std::unique_ptr<Stream> behind, Gate& gate) : behind_(std::move(behind)), gate_(gate) {}
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
-  void download(Buffer& buffer, void* data, std::size_t bytes) override { behind_->download(buffer, data, bytes); }
+  GatedStream(std::unique_ptr<Stream> behind, Gate& gate) : ForwardingStream(std::move(behind)), gate_(gate) {}
   void replay(Plan& plan) override {
     std::unique_lock<std::mutex> lock(gate_.mutex);
     gate_.moved.wait(lock, [this] { return !gate_.is_shut; });
     lock.unlock();
-    behind_->replay(plan);
+    behind().replay(plan);
   }
-  std::unique_ptr<Event> record_event() override { return behind_->record_event(); }
-  bool finish() override { return behind_->finish(); }
 
  private:
-  std::unique_ptr<Stream> behind_;
-  Gate& gate_;
-};
-
-class GatedBackend final : public Backend {
- public:
-  explicit GatedBackend(Gate& gate) : behind_(open_backend("simd")), gate_(gate) {}
-  const char* name() const override { return "gated"; }
-  DeviceInfo device() const override { return behind_->device(); }
-  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_->make_buffer(bytes); }
-  std::unique_ptr<Stream> make_stream() override {
-    return std::make_unique<GatedStream>(behind_->make_stream(), gate_);
-  }
-  std::unique_ptr<Plan> record(const std::vector<Step>& steps) override { return behind_->record(steps); }
-
- private:
-  std::unique_ptr<Backend> behind_;
   Gate& gate_;
 };
 
 TEST(PilotStream, NoFrameWaitsForTheNetworkAndItsLateWordIsCounted) {
   Gate gate;
-  GatedBackend slow(gate);
   const std::unique_ptr<Backend> simd = open_backend("simd");
+  test::ForwardingBackend slow("gated", *simd, [&](std::unique_ptr<Stream> behind) {
+    return std::make_unique<GatedStream>(std::move(behind), gate);
+  });
   PilotStreamConfig config = config_for(Overrun::newest);
   config.pipeline.deadlines_ns = {1, 1'000'000'000'000};
   std::mutex mutex;

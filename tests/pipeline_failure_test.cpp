@@ -9,6 +9,7 @@
 
 #include "berth/pipeline.hpp"
 #include "support/faulty_backend.hpp"
+#include "support/forwarding_backend.hpp"
 #include "support/pipeline_frames.hpp"
 
 namespace berth {
@@ -46,48 +47,32 @@ struct Throws {
   std::atomic<int> replays = 0, waits = 0;
 };
 
-class ThrowingStream final : public Stream {
+class ThrowingStream final : public test::ForwardingStream {
  public:
-  ThrowingStream(std::unique_ptr<Stream> behind, Throws& throws) : behind_(std::move(behind)), throws_(throws) {}
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
-  void download(Buffer& buffer, void* data, std::size_t bytes) override { behind_->download(buffer, data, bytes); }
+  ThrowingStream(std::unique_ptr<Stream> behind, Throws& throws)
+      : ForwardingStream(std::move(behind)), throws_(throws) {}
   void replay(Plan& plan) override {
     if (throws_.replays++ == throws_.in_replay) throw std::runtime_error("no replay");
-    behind_->replay(plan);
+    behind().replay(plan);
   }
-  std::unique_ptr<Event> record_event() override { return behind_->record_event(); }
   bool finish() override {
     if (throws_.waits++ == throws_.in_finish) throw std::runtime_error("no wait");
-    return behind_->finish();
+    return behind().finish();
   }
 
  private:
-  std::unique_ptr<Stream> behind_;
-  Throws& throws_;
-};
-
-class ThrowingBackend final : public Backend {
- public:
-  explicit ThrowingBackend(Throws& throws) : behind_(open_backend("simd")), throws_(throws) {}
-  const char* name() const override { return "throwing"; }
-  DeviceInfo device() const override { return behind_->device(); }
-  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_->make_buffer(bytes); }
-  std::unique_ptr<Stream> make_stream() override {
-    return std::make_unique<ThrowingStream>(behind_->make_stream(), throws_);
-  }
-  std::unique_ptr<Plan> record(const std::vector<Step>& steps) override { return behind_->record(steps); }
-
- private:
-  std::unique_ptr<Backend> behind_;
   Throws& throws_;
 };
 
 TEST(PipelineFailure, WhatABackendThrowsEndsItAndComesOutOfStop) {
+  const std::unique_ptr<Backend> simd = open_backend("simd");
   for (const bool on_host : {false, true}) {
     for (const bool calls_back : {false, true}) {
       SCOPED_TRACE(testing::Message() << (on_host ? "host" : "device") << (calls_back ? ", callback" : ", reader"));
       Throws throws;
-      ThrowingBackend backend(throws);
+      test::ForwardingBackend backend("throwing", *simd, [&](std::unique_ptr<Stream> behind) {
+        return std::make_unique<ThrowingStream>(std::move(behind), throws);
+      });
       PipelineConfig config;
       config.overrun = Overrun::wait;
       Pipeline::Deliver deliver;

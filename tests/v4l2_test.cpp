@@ -4,6 +4,7 @@
 
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
+#include "support/complaint.hpp"
 #include "support/fake_v4l2.hpp"
 
 namespace berth {
@@ -49,14 +50,7 @@ TEST(V4l2Options, ReadsEveryKey) {
 }
 
 TEST(V4l2Options, SaysWhatIsWrongWithAKey) {
-  const auto message = [](const std::string& text) {
-    try {
-      parse_v4l2(text);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string("accepted");
-  };
+  const auto message = [](const std::string& text) { return test::complaint([&] { parse_v4l2(text); }); };
   EXPECT_THAT(message(""), HasSubstr("name a camera"));
   EXPECT_THAT(message("video0,width=640"), AllOf(HasSubstr("height"), HasSubstr("missing")));
   EXPECT_THAT(message("video0,fps=fast"), AllOf(HasSubstr("fps"), HasSubstr("'fast'"), HasSubstr("frames per second")));

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "support/forwarding_backend.hpp"
+
 namespace berth::test {
 namespace {
 
@@ -24,64 +26,57 @@ class FaultyEvent final : public Event {
   const std::atomic<bool>& lost_;
 };
 
-class FaultyStream final : public Stream {
+class FaultyStream final : public ForwardingStream {
  public:
   FaultyStream(std::unique_ptr<Stream> behind, const Fault& fault, std::atomic<bool>& lost)
-      : behind_(std::move(behind)), fault_(fault), lost_(lost) {}
+      : ForwardingStream(std::move(behind)), fault_(fault), lost_(lost) {}
 
-  void upload(Buffer& buffer, const void* data, std::size_t bytes) override { behind_->upload(buffer, data, bytes); }
-  void download(Buffer& buffer, void* data, std::size_t bytes) override { behind_->download(buffer, data, bytes); }
   void replay(Plan& plan) override {
     FaultyPlan& faulty = static_cast<FaultyPlan&>(plan);
     const int frame = faulty.replays++;
     if (fault_.lose_frame >= 0 && frame >= fault_.lose_frame) lost_ = true;
     if (lost_) return;
     for (std::size_t i = 0; i < faulty.plans.size(); ++i) {
-      behind_->replay(*faulty.plans[i]);
+      behind().replay(*faulty.plans[i]);
       if (static_cast<int>(i) == fault_.flip_step && frame == fault_.flip_frame) flip(faulty.steps[i]);
     }
   }
   std::unique_ptr<Event> record_event() override {
-    return std::make_unique<FaultyEvent>(behind_->record_event(), lost_);
+    return std::make_unique<FaultyEvent>(behind().record_event(), lost_);
   }
-  void flush() override { behind_->flush(); }
-  bool is_immediate() const override { return behind_->is_immediate(); }
-  bool finish() override { return behind_->finish() && !lost_; }
+  bool finish() override { return behind().finish() && !lost_; }
 
  private:
   void flip(const Step& step) {
     Buffer& buffer = *step.buffers[static_cast<std::size_t>(fault_.flip_argument)];
     std::vector<u32> words(buffer.bytes() / 4);
-    behind_->download(buffer, words.data(), buffer.bytes());
-    behind_->finish();
+    behind().download(buffer, words.data(), buffer.bytes());
+    behind().finish();
     words[fault_.flip_word] ^= 1u << fault_.flip_bit;
-    behind_->upload(buffer, words.data(), buffer.bytes());
-    behind_->finish();
+    behind().upload(buffer, words.data(), buffer.bytes());
+    behind().finish();
   }
 
-  std::unique_ptr<Stream> behind_;
   const Fault& fault_;
   std::atomic<bool>& lost_;
 };
 
-class FaultyBackend final : public Backend {
+class FaultyBackend final : public ForwardingBackend {
  public:
-  FaultyBackend(Backend& behind, const Fault& fault) : behind_(behind), fault_(fault) {}
-  const char* name() const override { return "faulty"; }
-  DeviceInfo device() const override { return behind_.device(); }
-  std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override { return behind_.make_buffer(bytes); }
-  std::unique_ptr<Stream> make_stream() override {
-    return std::make_unique<FaultyStream>(behind_.make_stream(), fault_, lost_);
-  }
+  FaultyBackend(Backend& behind, const Fault& fault)
+      : ForwardingBackend("faulty", behind,
+                          [this](std::unique_ptr<Stream> stream) {
+                            return std::make_unique<FaultyStream>(std::move(stream), fault_, lost_);
+                          }),
+        fault_(fault) {}
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
     auto plan = std::make_unique<FaultyPlan>();
     plan->steps = steps;
-    for (const Step& step : steps) plan->plans.push_back(behind_.record({step}));
+    for (const Step& step : steps) plan->plans.push_back(behind().record({step}));
     return plan;
   }
 
  private:
-  Backend& behind_;
   Fault fault_;
   std::atomic<bool> lost_ = false;  // streams of several threads see it
 };
