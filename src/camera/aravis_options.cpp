@@ -1,4 +1,3 @@
-#include <algorithm>
 
 #include "camera/aravis_camera.hpp"
 #include "camera/aravis_formats.hpp"
@@ -23,13 +22,7 @@ bool set_image(AravisOptions& options, const SourceKeys& keys, const std::string
   } else if (key == "y") {
     options.y = keys.whole(key, value, 0, 65535);
   } else if (key == "format") {
-    const std::vector<std::string> known = aravis_formats();
-    if (std::find(known.begin(), known.end(), value) == known.end()) {
-      std::string all;
-      for (const std::string& format : known) all += (all.empty() ? "" : ", ") + format;
-      keys.refuse(key, value, "give one of " + all);
-    }
-    options.format = value;
+    options.format = keys.one_of(key, value, aravis_formats());
   } else {
     return false;
   }

@@ -1,5 +1,6 @@
 #include "camera/source_keys.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <locale>
 #include <sstream>
@@ -66,6 +67,14 @@ double SourceKeys::real(const std::string& key, const std::string& value, double
     refuse(key, value, "give a number from " + shown(least) + " to " + shown(most));
   }
   return number;
+}
+
+std::string SourceKeys::one_of(const std::string& key, const std::string& value,
+                               const std::vector<std::string>& known) const {
+  if (std::find(known.begin(), known.end(), value) != known.end()) return value;
+  std::string all;
+  for (const std::string& one : known) all += (all.empty() ? "" : ", ") + one;
+  refuse(key, value, "give one of " + all);
 }
 
 void SourceKeys::refuse(const std::string& key, const std::string& value, const std::string& remedy) const {

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace berth {
 
@@ -20,6 +21,8 @@ class SourceKeys {
   /// Above 0.
   double frames_per_second(const std::string& key, const std::string& value) const;
   double real(const std::string& key, const std::string& value, double least, double most) const;
+  /// The value itself.
+  std::string one_of(const std::string& key, const std::string& value, const std::vector<std::string>& known) const;
   [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& remedy) const;
   /// Throws Error unless both are given or neither.
   void check_size(int width, int height) const;

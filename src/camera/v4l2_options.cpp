@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <limits>
 
 #include "camera/bad_input.hpp"
@@ -24,13 +23,7 @@ bool set(V4l2Options& options, const SourceKeys& keys, const std::string& key, c
   } else if (key == "fps") {
     options.fps = keys.frames_per_second(key, value);
   } else if (key == "format") {
-    const std::vector<std::string> known = v4l2_formats();
-    if (std::find(known.begin(), known.end(), value) == known.end()) {
-      std::string all;
-      for (const std::string& format : known) all += (all.empty() ? "" : ", ") + format;
-      keys.refuse(key, value, "give one of " + all);
-    }
-    options.format = value;
+    options.format = keys.one_of(key, value, v4l2_formats());
   } else if (key == "exposure_us") {
     options.exposure_us = keys.whole(key, value, 1, 10'000'000);
   } else if (key == "gain") {
