@@ -2,10 +2,9 @@
 
 #include <cassert>
 #include <cstddef>
-#include <memory>
 #include <vector>
 
-#include "berth/backend.hpp"
+#include "buffer_list.hpp"
 
 namespace berth {
 
@@ -13,25 +12,21 @@ namespace berth {
 /// overwrite. Every plan asks for them in the same order, the one that needs most first.
 class ScratchBuffers {
  public:
-  explicit ScratchBuffers(Backend& backend) : backend_(backend) {}
+  explicit ScratchBuffers(Backend& backend) : list_(backend) {}
 
   /// For the next plan.
   void begin() { next_ = 0; }
   Buffer* take(std::size_t words) {
-    if (next_ == buffers_.size()) buffers_.push_back(backend_.make_buffer(words * 4));
-    Buffer* const buffer = buffers_[next_++].get();
+    if (next_ == buffers_.size()) buffers_.push_back(list_.make(words));
+    Buffer* const buffer = buffers_[next_++];
     assert(buffer->bytes() >= words * 4);
     return buffer;
   }
-  std::size_t device_bytes() const {
-    std::size_t bytes = 0;
-    for (const auto& buffer : buffers_) bytes += buffer->bytes();
-    return bytes;
-  }
+  std::size_t device_bytes() const { return list_.device_bytes(); }
 
  private:
-  Backend& backend_;
-  std::vector<std::unique_ptr<Buffer>> buffers_;
+  BufferList list_;
+  std::vector<Buffer*> buffers_;  // of the list, in order
   std::size_t next_ = 0;
 };
 

@@ -114,10 +114,7 @@ double CameraPlay::frames_per_second() const {
 
 void CameraPlay::describe(std::ostream& out) const {
   out << fmt::format("camera      {}x{}, each frame straight into a slot\n", camera_.width(), camera_.height());
-  print_memory(out, pipeline_.memory());
-  if (!options_.cores.empty()) out << fmt::format("; cores {}", fmt::join(options_.cores, ", "));
-  if (options_.realtime > 0) out << fmt::format("; SCHED_FIFO {}", options_.realtime);
-  out << '\n';
+  print_set_up(out, pipeline_.memory(), options_.cores, options_.realtime);
 }
 
 void CameraPlay::sum_up(std::ostream& out) const {

@@ -199,10 +199,7 @@ void PacedPlay::describe(std::ostream& out) const {
   }
   out << fmt::format("camera      {:g} frames/s, {} frames from {} in memory ({:.1f} MB)\n", options_.fps, total_,
                      frames_.size(), megabytes(bytes));
-  print_memory(out, pipeline_.memory());
-  if (!options_.cores.empty()) out << fmt::format("; cores {}", fmt::join(options_.cores, ", "));
-  if (options_.realtime > 0) out << fmt::format("; SCHED_FIFO {}", options_.realtime);
-  out << '\n';
+  print_set_up(out, pipeline_.memory(), options_.cores, options_.realtime);
 }
 
 void PacedPlay::sum_up(std::ostream& out) const {

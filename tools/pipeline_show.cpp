@@ -1,6 +1,7 @@
 #include "pipeline_show.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <utility>
@@ -14,9 +15,12 @@ double megabytes(std::size_t bytes) { return static_cast<double>(bytes) / 1e6; }
 
 }  // namespace
 
-void print_memory(std::ostream& out, const PipelineMemory& memory) {
+void print_set_up(std::ostream& out, const PipelineMemory& memory, const std::vector<int>& cores, int realtime) {
   out << fmt::format("pipeline    {} slots: {:.1f} MB for the device, {:.1f} MB for the host, no more after this",
                      memory.slots, megabytes(memory.device_bytes), megabytes(memory.host_bytes));
+  if (!cores.empty()) out << fmt::format("; cores {}", fmt::join(cores, ", "));
+  if (realtime > 0) out << fmt::format("; SCHED_FIFO {}", realtime);
+  out << '\n';
 }
 
 void print_counts(std::ostream& out, const PipelineCounts& counts) {

@@ -8,8 +8,8 @@
 
 namespace berth::cli {
 
-/// "pipeline    4 slots: 11.2 MB for the device, …", without an end of line.
-void print_memory(std::ostream& out, const PipelineMemory& memory);
+/// "pipeline    4 slots: 11.2 MB for the device, …; cores 0, 1; SCHED_FIFO 50"
+void print_set_up(std::ostream& out, const PipelineMemory& memory, const std::vector<int>& cores, int realtime);
 /// "300 frames offered, 294 delivered, 6 dropped (waiting for …)", without an end of line.
 void print_counts(std::ostream& out, const PipelineCounts& counts);
 /// A row of percentiles for each lap, ms.
