@@ -46,7 +46,7 @@ struct PilotStreamCounts {
   Beside beside_network, alone;
 };
 
-/// Search, navigation and docking on a camera's frames (docs/hand-over.md#at-a-cameras-pace): the marker's part in a
+/// Search, navigation and docking on a camera's frames (docs/hand-over.md, At a camera's pace): the marker's part in a
 /// Pipeline, which never waits for the network; the network's on a thread of its own and, where wanted, on another
 /// backend. Its word on a frame counts at a later one, network_frames on. As long as none comes late, modes and
 /// positions depend on the frames that were not dropped alone.
