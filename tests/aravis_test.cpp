@@ -51,7 +51,7 @@ class Aravis : public testing::Test {
   static void TearDownTestSuite() { folder_.reset(); }
 
   static std::vector<std::string> arguments(const std::string& lost = "0") {
-    return {"dir:" + folder_->path(), "6", lost};
+    return {"dir:" + folder_->path(), "6", "lost=" + lost};
   }
 
   /// The image that the frame is, bit for bit; empty where it is none.
@@ -193,7 +193,7 @@ TEST_F(Aravis, TakesTimesFromTheCamera) {
       <Sign>Unsigned</Sign><Endianess>BigEndian</Endianess>
     </IntReg>)"));
   std::vector<std::string> with_nodes = arguments();
-  with_nodes.push_back(nodes);
+  with_nodes.push_back("nodes=" + nodes);
   const FakeGigeProcess camera(with_nodes);
   for (const char* clock : {"ptp", "camera"}) {
     const auto source = open_source((kCamera + ",exposure_us=4000,time=").append(clock));

@@ -125,6 +125,14 @@ void CameraPlay::sum_up(std::ostream& out) const {
   print_late(out, options_.deadlines_ms, counts.late, counts.delivered);
 }
 
-Json CameraPlay::summary() const { return {{"summary", to_json(pipeline_, options_.deadlines_ms)}}; }
+Json CameraPlay::summary() const {
+  Json json = to_json(pipeline_, options_.deadlines_ms);
+  const SourceHealth health = camera_.health();
+  json["camera"] = {{"skipped", health.skipped},
+                    {"lost", health.lost},
+                    {"incomplete", health.incomplete},
+                    {"reopened", health.reopened}};
+  return {{"summary", json}};
+}
 
 }  // namespace berth::cli

@@ -1,9 +1,14 @@
 // A GigE Vision camera on 127.0.0.1, Aravis' own fake one with the serial number GV77, that shows a source's frames in
 // turn:
-//   fake_gige_camera SOURCE FRAMES [LOST [NODES]]
-// LOST is the share of packets that it loses on the way, NODES a file of GenICam nodes that it has besides its own. It
-// is there once it has written a line, and until its standard input ends.
+//   fake_gige_camera SOURCE FRAMES [KEY=VALUE...]
+// It is there once it has written a line, and until its standard input ends. Keys:
+//   lost=SHARE  of the packets, which it loses on the way
+//   nodes=FILE  of GenICam nodes that it has besides its own
+//   sent=FILE   where it writes each frame's time as it takes it, a line each, whatever becomes of the process
+//   most=COUNT  frames that it sends in all; it is silent after them
 #include <arv.h>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -11,6 +16,8 @@
 #include <exception>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -20,12 +27,24 @@ namespace {
 
 struct Show {
   std::vector<berth::GrayImage> images;
-  std::size_t next = 0;
+  std::size_t next = 0, most = SIZE_MAX;
+  int sent = -1;
+  ArvGvFakeCamera* camera = nullptr;
 };
+
+void lose(ArvGvFakeCamera* camera, double share) { g_object_set(camera, "gvsp-lost-ratio", share, nullptr); }
+
+/// In one call, so that a line is there as soon as the frame is.
+void note_time(const Show& show, ArvBuffer* buffer) {
+  const std::string line = std::to_string(arv_buffer_get_timestamp(buffer)) + "\n";
+  if (show.sent >= 0 && write(show.sent, line.data(), line.size()) < 0) std::perror("fake_gige_camera: sent");
+}
 
 /// Aravis says that the buffer has 0 bytes; it has room for a frame of the size that the camera is set to.
 void draw(ArvBuffer* buffer, void* data, guint32, guint32, ArvPixelFormat) {
   Show& show = *static_cast<Show*>(data);
+  if (show.next == show.most) return lose(show.camera, 1);
+  note_time(show, buffer);
   const berth::GrayImage& image = show.images[show.next++ % show.images.size()];
   std::size_t ignored = 0;
   auto* pixels = static_cast<unsigned char*>(const_cast<void*>(arv_buffer_get_data(buffer, &ignored)));
@@ -55,17 +74,30 @@ std::string describe(const std::string& nodes) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc < 3) return std::fprintf(stderr, "fake_gige_camera SOURCE FRAMES [LOST [NODES]]\n"), 2;
+  std::map<std::string, std::string> keys;
+  for (int i = 3; i < argc; ++i) {
+    const std::string given = argv[i];
+    const std::size_t equals = given.find('=');
+    if (equals == std::string::npos) throw std::invalid_argument(given + ": give KEY=VALUE");
+    keys[given.substr(0, equals)] = given.substr(equals + 1);
+  }
+  if (argc < 3) throw std::invalid_argument("fake_gige_camera SOURCE FRAMES [KEY=VALUE...]");
   Show show;
   const auto source = berth::open_source(argv[1]);
   for (int left = std::stoi(argv[2]); left > 0; --left) show.images.push_back(source->next().value().image);
-  const std::string description = argc > 4 ? describe(argv[4]) : "";
+  if (keys.count("most") > 0) show.most = std::stoul(keys["most"]);
+  if (keys.count("sent") > 0) {
+    show.sent = open(keys["sent"].c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (show.sent < 0) throw std::invalid_argument(keys["sent"] + ": it cannot be written");
+  }
+  const std::string description = keys.count("nodes") > 0 ? describe(keys["nodes"]) : "";
   ArvGvFakeCamera* camera =
       arv_gv_fake_camera_new_full("127.0.0.1", "GV77", description.empty() ? nullptr : description.c_str());
   if (arv_gv_fake_camera_is_running(camera) == 0) {
     return std::fprintf(stderr, "UDP port 3956 of 127.0.0.1 cannot be had\n"), 1;
   }
-  if (argc > 3) g_object_set(camera, "gvsp-lost-ratio", std::stod(argv[3]), nullptr);
+  show.camera = camera;
+  if (keys.count("lost") > 0) lose(camera, std::stod(keys["lost"]));
   arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), draw, &show);
   std::puts("ready");
   std::fflush(stdout);
