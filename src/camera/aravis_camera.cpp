@@ -58,7 +58,7 @@ class AravisCamera final : public LiveCamera {
     filled.damaged = !is_as_set(buffer);
     filled.bytes = 0;
     if (!filled.damaged) arv_buffer_get_part_data(buffer, 0, &filled.bytes);
-    filled.sequence = count(arv_buffer_get_frame_id(buffer));
+    filled.sequence = count(buffer);
     stamp(buffer, filled);
     return 0;
   }
@@ -306,8 +306,15 @@ class AravisCamera final : public LiveCamera {
            arv_buffer_get_part_pixel_format(buffer, 0) == pixel_format_;
   }
 
-  /// The camera's own number as one that counts on: GigE Vision 1 has 16 bits and leaves 0 out, others have 64.
-  std::uint32_t count(u64 id) {
+  /// The camera's own number as one that counts on: GigE Vision 1 has 16 bits and leaves 0 out, others have 64. A buffer
+  /// whose first packet was lost has the number of what was in it before, so of those with packets missing none is
+  /// believed: they come in their turn.
+  std::uint32_t count(ArvBuffer* buffer) {
+    if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {
+      ++last_id_;
+      return ++sequence_;
+    }
+    const u64 id = arv_buffer_get_frame_id(buffer);
     constexpr u64 kLast = 65535;
     u64 step = 1;
     if (has_id_ && id > last_id_) step = id - last_id_;

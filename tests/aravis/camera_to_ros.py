@@ -240,7 +240,7 @@ def check_frames(cameras, lines, summary, expected, given_up):
     check(camera["reopened"] >= 1, "the camera was not opened again")
     uncounted += sum(sorted(gaps, reverse=True)[:given_up])
     check(counted <= missing <= counted + uncounted,
-          f"{missing} frames did not become results, {counted} are counted, {uncounted} could not be")
+          f"{missing} frames did not become results, {counted} are counted, {uncounted} could not be: {summary}")
     return sum(map(len, taken)), sum(gaps)
 
 
