@@ -30,6 +30,10 @@ set(CPACK_COMPONENT_DEV_DESCRIPTION "docking vision: what others build with
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME berth)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS "ocl-icd-libopencl1, libvulkan1")
+if(BERTH_WITH_GSTREAMER)
+  # appsink and videoconvert; v4l2src, jpegdec.
+  set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "gstreamer1.0-plugins-base, gstreamer1.0-plugins-good")
+endif()
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION "docking vision: the command
  Finds markers in images, streams and cameras, calibrates, simulates, measures.
  A service unit for systemd comes with it and is not enabled.")

@@ -190,8 +190,9 @@ void add_calibrate(CLI::App& app, Console& console, int& exit_code) {
   const auto options = std::make_shared<CalibrateCommand>();
   command->add_option("IMAGE", options->images, "PNG, JPEG or PNM files, or folders of them");
   command
-      ->add_option("--source", options->source,
-                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE, v4l2:CAMERA or aravis:CAMERA instead of images")
+      ->add_option(
+          "--source", options->source,
+          "sim:FILE, dir:DIR, video:FILE, mcap:FILE, v4l2:CAMERA, aravis:CAMERA or gst:PIPELINE instead of images")
       ->type_name("SOURCE");
   command->add_option("--board", options->kind, "aprilgrid, chessboard or charuco")
       ->transform(CLI::CheckedTransformer(std::map<std::string, BoardKind>{

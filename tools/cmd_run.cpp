@@ -33,6 +33,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source v4l2:video0,width=640,height=480,fps=120 --camera cam.yaml --size 0.08 --filter
   berth run --source v4l2:video0,width=640,height=480,fps=120 --stream --track    at its own pace
   berth run --source aravis:SERIAL,width=640,height=480,fps=300,exposure_us=500,packet_size=8000 --stream
+  berth run --source 'gst:v4l2src ! jpegdec ! videoconvert' --stream     whatever GStreamer reaches
   berth run --source dir:recording/ --lockstep simd,opencl       every stage of every frame compared
   berth run --source sim:scenarios/approach.toml --record approach.mcap    for berth replay, Foxglove, rosbag2
   berth run --source mcap:approach.mcap --corners photometric              a recording, searched otherwise
@@ -85,8 +86,8 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   const auto options = std::make_shared<Options>();
   command
       ->add_option("--source", options->source,
-                   "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, mcap:FILE (a recording), v4l2:CAMERA "
-                   "or aravis:CAMERA (docs/cameras.md), or a path that tells")
+                   "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, mcap:FILE (a recording), v4l2:CAMERA, "
+                   "aravis:CAMERA or gst:PIPELINE (docs/cameras.md), or a path that tells")
       ->type_name("SOURCE")
       ->required();
   // Read before the command line is parsed: run_config.hpp.
@@ -155,7 +156,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       given.stream = given.stream || set != pipeline.end();
     } else if (stream->count() > 0 || (set != pipeline.end() && given.fps == 0)) {
       throw Error((stream->count() > 0 ? "--stream" : (*set)->get_name()) +
-                  " is for a camera's frames (v4l2:, aravis:); play those of a recording by --fps");
+                  " is for a camera's frames (v4l2:, aravis:, gst:); play those of a recording by --fps");
     }
     if (options->stream.track && !options->stream.engine.target_files.empty()) {
       throw Error(

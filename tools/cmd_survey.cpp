@@ -187,7 +187,7 @@ void add_survey(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("SOURCE", options->sources, "a scenario, video or folder, or image files: PNG, JPEG or PNM");
   command
       ->add_option("--source", options->source,
-                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE, v4l2:CAMERA or aravis:CAMERA instead")
+                   "sim:FILE, dir:DIR, video:FILE, mcap:FILE, v4l2:CAMERA, aravis:CAMERA or gst:PIPELINE instead")
       ->type_name("SOURCE");
   command->add_option("--camera", options->engine.camera_file, "camera file [that of the simulation]")
       ->type_name("FILE");

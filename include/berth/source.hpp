@@ -56,7 +56,7 @@ struct SourceHealth {
 };
 
 /// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`,
-/// `aravis:CAMERA`.
+/// `aravis:CAMERA`, `gst:PIPELINE`.
 class Source {
  public:
   virtual ~Source() = default;

@@ -306,9 +306,9 @@ class AravisCamera final : public LiveCamera {
            arv_buffer_get_part_pixel_format(buffer, 0) == pixel_format_;
   }
 
-  /// The camera's own number as one that counts on: GigE Vision 1 has 16 bits and leaves 0 out, others have 64. A buffer
-  /// whose first packet was lost has the number of what was in it before, so of those with packets missing none is
-  /// believed: they come in their turn.
+  /// The camera's own number as one that counts on: GigE Vision 1 has 16 bits and leaves 0 out, others have 64. A
+  /// buffer whose first packet was lost has the number of what was in it before, so of those with packets missing none
+  /// is believed: they come in their turn.
   std::uint32_t count(ArvBuffer* buffer) {
     if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {
       ++last_id_;

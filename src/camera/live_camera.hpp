@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <string>
@@ -34,6 +35,9 @@ class LiveCamera {
   virtual int give_back(const Filled& filled) = 0;
   /// Writes the image in that buffer as 8-bit gray, width() x height(). False where it is incomplete.
   virtual bool read(const Filled& filled, View2D<u8> image) const = 0;
+
+  /// What an errno of take() or give_back() means.
+  virtual std::string explain(int error) const { return std::strerror(error); }
 
   virtual int width() const = 0;
   virtual int height() const = 0;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <future>
 #include <optional>
 #include <utility>
@@ -48,11 +47,11 @@ class LiveSource final : public CameraSource {
     const Clock::time_point deadline = Clock::now() + milliseconds(options_.watchdog_ms);
     for (;;) {
       const int error = take_newest(awaited_, deadline);
-      if (error != 0 && error != ETIMEDOUT) lose(std::strerror(error));
+      if (error != 0 && error != ETIMEDOUT) lose(camera_->explain(error));
       if (error == 0 && !awaited_.damaged) return stamp(awaited_);
       if (error == 0) {
         ++health_.incomplete;
-        if (const int refused = camera_->give_back(awaited_)) lose(std::strerror(refused));
+        if (const int refused = camera_->give_back(awaited_)) lose(camera_->explain(refused));
       }
       // A camera whose frames are all damaged is of no more use than one that gives none.
       if (Clock::now() >= deadline) lose_for_silence();
@@ -66,7 +65,7 @@ class LiveSource final : public CameraSource {
     }
     const bool is_whole = camera_->read(awaited_, image);
     if (!is_whole) ++health_.incomplete;
-    if (const int refused = camera_->give_back(awaited_)) lose(std::strerror(refused));
+    if (const int refused = camera_->give_back(awaited_)) lose(camera_->explain(refused));
     if (is_whole) {
       pause_ = kFirstPause;
       incomplete_since_.reset();

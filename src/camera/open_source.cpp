@@ -14,7 +14,9 @@ bool ends_with(const std::string& text, const std::string& end) {
 
 }  // namespace
 
-bool names_camera(const std::string& spec) { return spec.rfind("v4l2:", 0) == 0 || spec.rfind("aravis:", 0) == 0; }
+bool names_camera(const std::string& spec) {
+  return spec.rfind("v4l2:", 0) == 0 || spec.rfind("aravis:", 0) == 0 || spec.rfind("gst:", 0) == 0;
+}
 
 std::unique_ptr<Source> open_source(const std::string& spec) {
   const std::size_t colon = spec.find(':');
@@ -27,13 +29,14 @@ std::unique_ptr<Source> open_source(const std::string& spec) {
   if (kind == "mcap") return open_mcap(rest);
   if (kind == "v4l2") return open_v4l2(parse_v4l2(rest));
   if (kind == "aravis") return open_aravis(parse_aravis(rest));
+  if (kind == "gst") return open_gst(parse_gst(rest));
 
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(spec, error);
   if (!std::filesystem::exists(status)) {
     throw Error(spec +
                 ": there is no such file or folder; give a path, or a source as sim:FILE, dir:DIR, file:IMAGE, "
-                "video:FILE, mcap:FILE, v4l2:CAMERA or aravis:CAMERA");
+                "video:FILE, mcap:FILE, v4l2:CAMERA, aravis:CAMERA or gst:PIPELINE");
   }
   if (std::filesystem::is_directory(status)) return open_images(list_images(spec, false));
   if (ends_with(spec, ".toml")) return open_scenario(spec);

@@ -6,6 +6,7 @@
 
 #include "berth/source.hpp"
 #include "camera/aravis_camera.hpp"
+#include "camera/gst_camera.hpp"
 #include "camera/v4l2_camera.hpp"
 
 namespace berth {
@@ -43,6 +44,11 @@ std::unique_ptr<CameraSource> open_v4l2(const V4l2Options& options, V4l2Opener o
 /// exposure is known unless the camera controls its exposure itself.
 std::unique_ptr<CameraSource> open_aravis(const AravisOptions& options);
 
+/// A GStreamer pipeline, in all like open_v4l2; one that has ended or failed is built again. Times are the pipeline's,
+/// which runs on the monotonic clock, taken for the end of the exposure; its middle is known where
+/// GstOptions::exposure_us is set.
+std::unique_ptr<CameraSource> open_gst(const GstOptions& options);
+
 /// Whether it is a camera that open_source(spec) would open: a CameraSource, with a pace of its own.
 bool names_camera(const std::string& spec);
 
@@ -52,8 +58,8 @@ bool names_camera(const std::string& spec);
 std::unique_ptr<Source> open_mcap(const std::string& path);
 
 /// A source by its name: `sim:FILE` (scenario), `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`,
-/// `aravis:CAMERA`. A bare path is told by what it is: a folder, a name ending in .toml or .mcap, an image name,
-/// otherwise a video. Throws Error that lists what there is.
+/// `aravis:CAMERA`, `gst:PIPELINE`. A bare path is told by what it is: a folder, a name ending in .toml or .mcap, an
+/// image name, otherwise a video. Throws Error that lists what there is.
 std::unique_ptr<Source> open_source(const std::string& spec);
 
 }  // namespace berth

@@ -1,20 +1,22 @@
 // A GigE Vision camera on 127.0.0.1, Aravis' own fake one with the serial number GV77, that shows a source's frames in
 // turn:
 //   fake_gige_camera SOURCE FRAMES [KEY=VALUE...]
-// It is there once it has written a line, and until its standard input ends. Keys:
+// It is there once it has written a line, and until its standard input ends. A number on a line there: so many frames
+// more, then it is silent. Keys:
 //   lost=SHARE  of the packets, which it loses on the way
 //   nodes=FILE  of GenICam nodes that it has besides its own
 //   sent=FILE   where it writes each frame's time as it takes it, a line each, whatever becomes of the process
-//   most=COUNT  frames that it sends in all; it is silent after them
 #include <arv.h>
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <cstring>
 #include <exception>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <map>
 #include <stdexcept>
@@ -27,7 +29,7 @@ namespace {
 
 struct Show {
   std::vector<berth::GrayImage> images;
-  std::size_t next = 0, most = SIZE_MAX;
+  std::atomic<std::size_t> next = 0, most = SIZE_MAX;
   int sent = -1;
   ArvGvFakeCamera* camera = nullptr;
 };
@@ -43,7 +45,7 @@ void note_time(const Show& show, ArvBuffer* buffer) {
 /// Aravis says that the buffer has 0 bytes; it has room for a frame of the size that the camera is set to.
 void draw(ArvBuffer* buffer, void* data, guint32, guint32, ArvPixelFormat) {
   Show& show = *static_cast<Show*>(data);
-  if (show.next == show.most) return lose(show.camera, 1);
+  if (show.next >= show.most) return lose(show.camera, 1);
   note_time(show, buffer);
   const berth::GrayImage& image = show.images[show.next++ % show.images.size()];
   std::size_t ignored = 0;
@@ -85,7 +87,6 @@ int main(int argc, char** argv) try {
   Show show;
   const auto source = berth::open_source(argv[1]);
   for (int left = std::stoi(argv[2]); left > 0; --left) show.images.push_back(source->next().value().image);
-  if (keys.count("most") > 0) show.most = std::stoul(keys["most"]);
   if (keys.count("sent") > 0) {
     show.sent = open(keys["sent"].c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
     if (show.sent < 0) throw std::invalid_argument(keys["sent"] + ": it cannot be written");
@@ -101,8 +102,7 @@ int main(int argc, char** argv) try {
   arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), draw, &show);
   std::puts("ready");
   std::fflush(stdout);
-  while (std::getchar() != EOF) {
-  }
+  for (std::string line; std::getline(std::cin, line);) show.most = show.next + std::stoul(line);
   g_object_unref(camera);
   return 0;
 } catch (const std::exception& error) {
