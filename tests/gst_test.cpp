@@ -25,13 +25,13 @@ using testing::StartsWith;
 const std::string kImage = BERTH_TEST_DATA "/tag36h11_7.png";
 constexpr int kWidth = 320, kHeight = 240;
 
-/// The picture again and again, `fps` times a second.
-std::string picture(int fps = 100) {
-  return "multifilesrc location=" + kImage + " loop=true caps=image/png,framerate=" + std::to_string(fps) +
-         "/1 ! pngdec ! videoconvert";
-}
+/// For sources that are not to be given up, however busy the machine.
+const std::string kPatient = "gst:watchdog_ms=30000;";
+/// The picture again and again, 100 times a second.
+const std::string kPicture =
+    "multifilesrc location=" + kImage + " loop=true caps=image/png,framerate=100/1 ! pngdec ! videoconvert";
 
-std::string in_format(const std::string& format) { return picture() + " ! video/x-raw,format=" + format; }
+std::string in_format(const std::string& format) { return kPicture + " ! video/x-raw,format=" + format; }
 
 /// What the source complains of next; frames that come before are passed over.
 std::string next_complaint(Source& source) {
@@ -80,7 +80,7 @@ TEST(Gst, GivesThePictureInEveryFormat) {
   ASSERT_EQ(direct.detections.size(), 1U);
   ASSERT_TRUE(direct.detections[0].has_pose);
   for (const std::string& format : gst_formats()) {
-    const SourceFrame frame = *open_source("gst:" + in_format(format))->next();
+    const SourceFrame frame = *open_source(kPatient + in_format(format))->next();
     ASSERT_EQ(frame.image.width(), kWidth) << format;
     ASSERT_EQ(frame.image.height(), kHeight) << format;
     EXPECT_EQ(image_digest(frame.image), image_digest(expected)) << format;
@@ -96,7 +96,7 @@ TEST(Gst, ReadsRowsThatEndInPadding) {
   const GrayImage whole = read_gray_image(kImage);
   for (const char* format : {"GRAY8", "BGR"}) {
     const std::string cut = " ! videocrop left=1 top=2";
-    const SourceFrame frame = *open_source("gst:" + in_format(format) + cut)->next();
+    const SourceFrame frame = *open_source(kPatient + in_format(format) + cut)->next();
     ASSERT_EQ(frame.image.width(), kWidth - 1);
     ASSERT_EQ(frame.image.height(), kHeight - 2);
     int differing = 0;
@@ -113,9 +113,8 @@ TEST(Gst, TakesTimesFromThePipeline) {
   // Played at its own pace, and live.
   for (const char* live : {"false", "true"}) {
     const std::int64_t start_ns = monotonic_ns();
-    const auto source = open_source(
-        "gst:exposure_us=4000;videotestsrc is-live=" + std::string(live) +
-        " ! video/x-raw,format=GRAY8,width=32,height=16,framerate=50/1");
+    const auto source = open_source("gst:exposure_us=4000,watchdog_ms=30000;videotestsrc is-live=" + std::string(live) +
+                                    " ! video/x-raw,format=GRAY8,width=32,height=16,framerate=50/1");
     std::int64_t first_ns = 0;
     FrameStamp last;
     for (int i = 0; i < 4; ++i) {
@@ -137,7 +136,8 @@ TEST(Gst, TakesTimesFromThePipeline) {
 
 TEST(Gst, HoldsTheNewestFrames) {
   // Faster than anything here: the ring runs over all the time.
-  const auto source = open_source("gst:buffers=2;videotestsrc ! video/x-raw,format=GRAY8,width=32,height=16,framerate=2000/1");
+  const auto source = open_source(
+      "gst:buffers=2,watchdog_ms=30000;videotestsrc ! video/x-raw,format=GRAY8,width=32,height=16,framerate=2000/1");
   u64 taken = 0;
   std::int64_t first_ns = 0, last_ns = 0;
   while (source->health().skipped == 0 || source->health().lost == 0) {
@@ -154,17 +154,19 @@ TEST(Gst, HoldsTheNewestFrames) {
 }
 
 TEST(Gst, PlaysAgainWhatHasEnded) {
-  const auto source = open_source("gst:videotestsrc num-buffers=3 ! video/x-raw,format=GRAY8,width=32,height=16,framerate=100/1");
+  const auto source =
+      open_source("gst:videotestsrc num-buffers=3 ! video/x-raw,format=GRAY8,width=32,height=16,framerate=100/1");
   ASSERT_TRUE(source->next());
-  EXPECT_THAT(next_complaint(*source), AllOf(StartsWith("gst:videotestsrc: the camera is lost (its pipeline has ended)"),
-                                             HasSubstr("opened again")));
+  EXPECT_THAT(
+      next_complaint(*source),
+      AllOf(StartsWith("gst:videotestsrc: the camera is lost (its pipeline has ended)"), HasSubstr("opened again")));
   EXPECT_GE(next_frame(*source).stamp.sequence, 1U) << "goes on counting";
   EXPECT_EQ(source->health().reopened, 1U);
   EXPECT_EQ(source->health().lost, 0U);
 }
 
 TEST(Gst, BuildsAnewWhatFailed) {
-  const auto source = open_source("gst:" + picture() + " ! identity error-after=4");
+  const auto source = open_source("gst:" + kPicture + " ! identity error-after=4");
   ASSERT_TRUE(source->next());
   EXPECT_THAT(next_complaint(*source), HasSubstr("the camera is lost (Failed after iterations as requested"));
   EXPECT_EQ(image_digest(next_frame(*source).image), image_digest(read_gray_image(kImage)));
@@ -173,23 +175,26 @@ TEST(Gst, BuildsAnewWhatFailed) {
 
 TEST(Gst, IsGivenUpWhenItIsSilent) {
   // A second from one frame to the next.
-  const auto source = open_source("gst:watchdog_ms=50;videotestsrc ! video/x-raw,format=GRAY8,width=32,height=16,framerate=1/1");
+  const auto source =
+      open_source("gst:watchdog_ms=50;videotestsrc ! video/x-raw,format=GRAY8,width=32,height=16,framerate=1/1");
   EXPECT_THAT(next_complaint(*source), HasSubstr("no whole frame for 50 ms"));
 }
 
 TEST(Gst, SaysWhatIsWrongWithAPipeline) {
   const auto refusal = [](const std::string& pipeline) { return complaint([&] { open_source("gst:" + pipeline); }); };
-  EXPECT_THAT(refusal("nosuchsrc ! videoconvert"),
-              AllOf(StartsWith("gst:nosuchsrc: "), HasSubstr("no element \"nosuchsrc\""), HasSubstr("gst-inspect-1.0")));
+  EXPECT_THAT(
+      refusal("nosuchsrc ! videoconvert"),
+      AllOf(StartsWith("gst:nosuchsrc: "), HasSubstr("no element \"nosuchsrc\""), HasSubstr("gst-inspect-1.0")));
   EXPECT_THAT(refusal("videotestsrc ! fakesink"), HasSubstr("without a sink"));
-  EXPECT_THAT(refusal("videotestsrc ! video/x-raw,format=RGB15"), AllOf(HasSubstr("GRAY8, NV12"), HasSubstr("videoconvert")));
+  EXPECT_THAT(refusal("videotestsrc ! video/x-raw,format=RGB15"),
+              AllOf(HasSubstr("GRAY8, NV12"), HasSubstr("videoconvert")));
   EXPECT_THAT(refusal("multifilesrc location=/nowhere/%d.png ! pngdec"), HasSubstr("gives no frame"));
   EXPECT_THAT(refusal("videotestsrc num-buffers=0"), HasSubstr("its pipeline has ended"));
 }
 
 TEST(Gst, FramesGoThroughThePipelineOfTheCommand) {
   const test::CommandRun run =
-      test::run_berth({"run", "--source", "gst:" + picture(), "--stream", "--max-frames", "5", "--json", "-"});
+      test::run_berth({"run", "--source", kPatient + kPicture, "--stream", "--max-frames", "5", "--json", "-"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   std::istringstream lines(run.out);
   std::string line;

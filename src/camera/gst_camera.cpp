@@ -63,8 +63,7 @@ std::string text_of(GstMessage* message) {
 
 class GstCamera final : public LiveCamera {
  public:
-  explicit GstCamera(const GstOptions& options)
-      : options_(options), ring_(static_cast<std::size_t>(options.buffers)) {
+  explicit GstCamera(const GstOptions& options) : options_(options), ring_(static_cast<std::size_t>(options.buffers)) {
     build();
     play();
   }
@@ -161,8 +160,9 @@ class GstCamera final : public LiveCamera {
     gst_pipeline_use_clock(GST_PIPELINE(built), clock.get());
     const Object<GstBus> bus(gst_element_get_bus(built));
     gst_bus_set_sync_handler(
-        bus.get(), [](GstBus*, GstMessage* message, gpointer self) { return static_cast<GstCamera*>(self)->hear(message); },
-        this, nullptr);
+        bus.get(),
+        [](GstBus*, GstMessage* message, gpointer self) { return static_cast<GstCamera*>(self)->hear(message); }, this,
+        nullptr);
   }
 
   /// Ends when the first frame is there, which tells how large they are.
@@ -226,8 +226,8 @@ class GstCamera final : public LiveCamera {
     return GST_BUS_DROP;
   }
 
-  /// The source's own number as one that counts on, where its frames carry one as raw video has it: this frame's and the
-  /// next one's. Of others those that come here are counted.
+  /// The source's own number as one that counts on, where its frames carry one as raw video has it: this frame's and
+  /// the next one's. Of others those that come here are counted.
   std::uint32_t count(GstBuffer* buffer) {
     constexpr guint64 kMost = 1U << 30;
     const guint64 offset = GST_BUFFER_OFFSET(buffer);

@@ -17,8 +17,8 @@ struct GstOptions {
   int watchdog_ms = 1000;
 };
 
-/// Options of a source's name without "gst:": "[KEY=VALUE[,KEY=VALUE...];]PIPELINE". Throws Error that names the key, its
-/// value and the remedy.
+/// Options of a source's name without "gst:": "[KEY=VALUE[,KEY=VALUE...];]PIPELINE". Throws Error that names the key,
+/// its value and the remedy.
 GstOptions parse_gst(const std::string& text);
 
 /// What the source is called: "gst:" and the pipeline's first element.
@@ -27,8 +27,8 @@ std::string name_of(const GstOptions& options);
 /// GStreamer's names of the pixel formats that can be read.
 std::vector<std::string> gst_formats();
 
-/// Builds the pipeline, plays it and waits for its first frame. What it throws begins with name_of(options) and ": ", also
-/// where Berth was built without GStreamer.
+/// Builds the pipeline, plays it and waits for its first frame. What it throws begins with name_of(options) and ": ",
+/// also where Berth was built without GStreamer.
 LiveCameraOpener gst_opener(const GstOptions& options);
 
 }  // namespace berth
