@@ -9,7 +9,6 @@
 #include "camera/image_file.hpp"
 #include "camera/sources.hpp"
 #include "monotonic.hpp"
-#include "support/command_run.hpp"
 #include "support/complaint.hpp"
 #include "support/image_digest.hpp"
 
@@ -190,21 +189,6 @@ TEST(Gst, SaysWhatIsWrongWithAPipeline) {
               AllOf(HasSubstr("GRAY8, NV12"), HasSubstr("videoconvert")));
   EXPECT_THAT(refusal("multifilesrc location=/nowhere/%d.png ! pngdec"), HasSubstr("gives no frame"));
   EXPECT_THAT(refusal("videotestsrc num-buffers=0"), HasSubstr("its pipeline has ended"));
-}
-
-TEST(Gst, FramesGoThroughThePipelineOfTheCommand) {
-  const test::CommandRun run =
-      test::run_berth({"run", "--source", kPatient + kPicture, "--stream", "--max-frames", "5", "--json", "-"});
-  EXPECT_EQ(run.exit_code, 0) << run.err;
-  std::istringstream lines(run.out);
-  std::string line;
-  int found = 0;
-  while (std::getline(lines, line)) {
-    const auto json = nlohmann::json::parse(line);
-    if (json.contains("detections") && json["detections"].size() == 1 && json["detections"][0]["id"] == 7) ++found;
-  }
-  EXPECT_GE(found, 1);
-  EXPECT_THAT(run.err, HasSubstr("5 frames offered"));
 }
 
 }  // namespace

@@ -201,7 +201,7 @@ class GstCamera final : public LiveCamera {
     Held held;
     held.came_ns = monotonic_ns();
     const std::lock_guard<std::mutex> lock(mutex_);
-    held.sequence = count(gst_sample_get_buffer(sample.get()));
+    held.sequence = number_of(gst_sample_get_buffer(sample.get()));
     held.sample = std::move(sample);
     if (count_ == ring_.size()) {
       first_ = (first_ + 1) % ring_.size();
@@ -228,7 +228,7 @@ class GstCamera final : public LiveCamera {
 
   /// The source's own number as one that counts on, where its frames carry one as raw video has it: this frame's and
   /// the next one's. Of others those that come here are counted.
-  std::uint32_t count(GstBuffer* buffer) {
+  std::uint32_t number_of(GstBuffer* buffer) {
     constexpr guint64 kMost = 1U << 30;
     const guint64 offset = GST_BUFFER_OFFSET(buffer);
     const bool counts = offset != GST_BUFFER_OFFSET_NONE && GST_BUFFER_OFFSET_END(buffer) == offset + 1;
@@ -264,7 +264,7 @@ class GstCamera final : public LiveCamera {
   GstVideoInfo info_ = {};
   PixelFormat layout_ = PixelFormat::mono8;
   /// The reader has one at a time, and a newer one beside it while it chooses.
-  std::array<Sample, 3> lent_;
+  std::array<Sample, 2> lent_;
 
   mutable std::mutex mutex_;
   std::condition_variable change_;

@@ -7,6 +7,7 @@
 
 namespace berth {
 
+/// A pipeline of GStreamer's as a camera.
 struct GstOptions {
   /// As gst-launch-1.0 takes it, without a sink at its end.
   std::string pipeline;

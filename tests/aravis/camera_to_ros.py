@@ -76,8 +76,8 @@ def check(holds, what):
 class Camera:
     """A fake camera's process; `sent` has the times at which it took its frames, on its clock, ns."""
 
-    def __init__(self, program, scenario, shown, folder, lost):
-        self.path = pathlib.Path(tempfile.mktemp(dir=folder))
+    def __init__(self, program, scenario, shown, path, lost):
+        self.path = pathlib.Path(path)
         self.process = subprocess.Popen([program, scenario, str(shown), f"sent={self.path}", f"lost={lost}"],
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         check(self.process.stdout.readline() == b"ready\n", "the fake camera does not run")
@@ -127,7 +127,8 @@ class Run:
     def __init__(self, command):
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.output, self.lines = "", queue.SimpleQueue()
-        threading.Thread(target=lambda: [self.lines.put(line) for line in self.process.stdout], daemon=True).start()
+        self.reader = threading.Thread(target=lambda: [self.lines.put(line) for line in self.process.stdout], daemon=True)
+        self.reader.start()
 
     def read(self):
         while not self.lines.empty():
@@ -150,7 +151,7 @@ class Run:
     def end(self):
         self.process.send_signal(signal.SIGINT)
         self.process.wait(timeout=PATIENCE_S)
-        time.sleep(0.1)
+        self.reader.join()
         return self.read()
 
 
@@ -195,9 +196,11 @@ def fly(given, folder):
     expected = {hash(shape(json.loads(line))) for line in pathlib.Path(direct).read_text().splitlines()}
 
     def camera():
-        return Camera(given.fake_camera, scenario, given.shown, folder, given.lost)
+        path = os.path.join(folder, f"sent{len(cameras)}")
+        cameras.append(Camera(given.fake_camera, scenario, given.shown, path, given.lost))
 
-    cameras = [camera()]
+    cameras = []
+    camera()
     subscriber = Subscriber()
     subscriber.start()
     source = (f"aravis:127.0.0.1,width=640,height=480,fps={FPS},packet_size=9000,exposure_us={EXPOSURE_NS // 1000},"
@@ -218,7 +221,7 @@ def fly(given, folder):
             memory_kb.append(run.anonymous_kb())
         cameras[0].kill()
         run.wait_until(lambda: run.losses() >= 1, "complaint of the camera that was killed")
-        cameras.append(camera())
+        camera()
         run.wait_until(lambda: subscriber.poses[-1][1] > cameras[1].ready_ns, "poses after its return")
         frames = cameras[1].frames_sent() + given.frames
         cameras[1].silence_after(given.frames)
