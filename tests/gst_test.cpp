@@ -94,8 +94,8 @@ TEST(Gst, GivesThePictureInEveryFormat) {
 TEST(Gst, ReadsRowsThatEndInPadding) {
   const GrayImage whole = read_gray_image(kImage);
   for (const char* format : {"GRAY8", "BGR"}) {
-    const std::string cut = " ! videocrop left=1 top=2";
-    const SourceFrame frame = *open_source(kPatient + in_format(format) + cut)->next();
+    const std::string pipeline = in_format(format).append(" ! videocrop left=1 top=2");
+    const SourceFrame frame = *open_source(kPatient + pipeline)->next();
     ASSERT_EQ(frame.image.width(), kWidth - 1);
     ASSERT_EQ(frame.image.height(), kHeight - 2);
     int differing = 0;
