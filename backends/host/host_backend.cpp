@@ -7,13 +7,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <list>
 #include <mutex>
 #include <new>
 
-#include "berth/error.hpp"
 #include "host/worker_pool.hpp"
 
 namespace berth::host {
@@ -27,10 +25,9 @@ constexpr std::size_t kAlignment = 64;
 // are out of the caches. Buffers share chunks that the system may put on pages of 2 MB.
 constexpr std::size_t kHugePage = std::size_t{1} << 21;
 #ifdef BERTH_HOST_SEPARATE_BUFFERS
-constexpr std::size_t kLeastChunk =
-    0;  // what lies behind a buffer is nobody's, so that a sanitizer sees who goes there
+constexpr std::size_t kLeastShared = 0;  // what lies behind a buffer is nobody's: a sanitizer sees who goes there
 #else
-constexpr std::size_t kLeastChunk = kHugePage;
+constexpr std::size_t kLeastShared = kHugePage;
 #endif
 
 std::size_t rounded_up(std::size_t bytes, std::size_t unit) { return (bytes + unit - 1) / unit * unit; }
@@ -38,8 +35,8 @@ std::size_t rounded_up(std::size_t bytes, std::size_t unit) { return (bytes + un
 /// Memory that buffers share; it goes when the last of them does.
 class Chunk {
  public:
-  explicit Chunk(std::size_t bytes)
-      : alignment_(bytes >= kHugePage ? kHugePage : kAlignment),
+  Chunk(std::size_t bytes, std::size_t alignment)
+      : alignment_(alignment),
         bytes_(rounded_up(bytes, alignment_)),
         memory_(static_cast<unsigned char*>(::operator new(bytes_, static_cast<std::align_val_t>(alignment_)))) {
 #ifdef MADV_HUGEPAGE
@@ -71,6 +68,8 @@ class Chunk {
 /// A backend's chunks; buffers may be made and given back by several threads.
 class HostMemory {
  public:
+  explicit HostMemory(Chunks chunks) : least_chunk_(chunks == Chunks::shared ? kLeastShared : 0) {}
+
   struct Place {
     std::list<Chunk>::iterator chunk;
     unsigned char* memory;
@@ -78,7 +77,9 @@ class HostMemory {
   Place take(std::size_t bytes) {
     const std::size_t room = rounded_up(bytes, kAlignment);
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (chunks_.empty() || !chunks_.back().has_room(room)) chunks_.emplace_back(std::max(room, kLeastChunk));
+    if (chunks_.empty() || !chunks_.back().has_room(room)) {
+      chunks_.emplace_back(std::max(room, least_chunk_), std::max(least_chunk_, kAlignment));
+    }
     const auto chunk = std::prev(chunks_.end());
     return {chunk, chunk->take(room)};
   }
@@ -88,6 +89,7 @@ class HostMemory {
   }
 
  private:
+  std::size_t least_chunk_;
   std::mutex mutex_;
   std::list<Chunk> chunks_;
 };
@@ -125,18 +127,18 @@ class HostEvent final : public Event {
 
 class HostStream final : public Stream {
  public:
-  explicit HostStream(WorkerPool& pool) : pool_(pool) {}
+  HostStream(WorkerPool& pool, std::shared_ptr<void> workspace) : pool_(pool), workspace_(std::move(workspace)) {}
   void upload(Buffer& buffer, const void* data, std::size_t bytes) override { std::memcpy(buffer.host(), data, bytes); }
   void download(Buffer& buffer, void* data, std::size_t bytes) override { std::memcpy(data, buffer.host(), bytes); }
   void replay(Plan& plan) override {
-    for (const Call& call : static_cast<HostPlan&>(plan).calls) run(call);
+    for (Call& call : static_cast<HostPlan&>(plan).calls) run(call);
   }
   std::unique_ptr<Event> record_event() override { return std::make_unique<HostEvent>(); }
   bool is_immediate() const override { return true; }
   bool finish() override { return true; }
   std::vector<std::int64_t> time_steps(Plan& plan) override {
     std::vector<std::int64_t> times;
-    for (const Call& call : static_cast<HostPlan&>(plan).calls) {
+    for (Call& call : static_cast<HostPlan&>(plan).calls) {
       const auto start = std::chrono::steady_clock::now();
       run(call);
       times.push_back(
@@ -146,7 +148,8 @@ class HostStream final : public Stream {
   }
 
  private:
-  void run(const Call& call) {
+  void run(Call& call) {
+    if (call.op.workspace) call.buffers.back() = workspace_.get();
     if (call.op.whole || pool_.threads() == 1) {
       call.op.run(call.params.data(), call.buffers.data(), 0, call.op.whole ? 1 : call.groups);
     } else {
@@ -156,18 +159,21 @@ class HostStream final : public Stream {
   }
 
   WorkerPool& pool_;
+  std::shared_ptr<void> workspace_;
 };
 
 class HostBackend final : public Backend {
  public:
-  HostBackend(const char* name, DeviceInfo device, const HostOps& ops, int threads)
-      : name_(name), device_(std::move(device)), ops_(ops), pool_(threads) {}
+  HostBackend(const char* name, DeviceInfo device, const HostOps& ops, int threads, Chunks chunks)
+      : name_(name), device_(std::move(device)), ops_(ops), pool_(threads), memory_(chunks) {}
   const char* name() const override { return name_; }
   DeviceInfo device() const override { return device_; }
   std::unique_ptr<Buffer> make_buffer(std::size_t bytes) override {
     return std::make_unique<HostBuffer>(memory_, bytes);
   }
-  std::unique_ptr<Stream> make_stream() override { return std::make_unique<HostStream>(pool_); }
+  std::unique_ptr<Stream> make_stream() override {
+    return std::make_unique<HostStream>(pool_, ops_.make_workspace == nullptr ? nullptr : ops_.make_workspace());
+  }
   std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
     auto plan = std::make_unique<HostPlan>();
     for (const Step& step : steps) {
@@ -179,6 +185,7 @@ class HostBackend final : public Backend {
         if (parts == 0) call.op.run = call.op.other;
       }
       for (Buffer* buffer : step.buffers) call.buffers.push_back(buffer->host());
+      if (call.op.workspace) call.buffers.push_back(nullptr);  // the stream's
       plan->calls.push_back(std::move(call));
     }
     return plan;
@@ -194,23 +201,9 @@ class HostBackend final : public Backend {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_host_backend(const char* name, DeviceInfo device, const HostOps& ops, int threads) {
-  return std::make_unique<HostBackend>(name, std::move(device), ops, threads);
-}
-
-DeviceInfo processor(const std::string& driver) {
-  std::ifstream cpuinfo("/proc/cpuinfo");
-  for (std::string line; std::getline(cpuinfo, line);) {
-    const std::size_t colon = line.find(": ");
-    if (line.compare(0, 10, "model name") == 0 && colon != std::string::npos) return {line.substr(colon + 2), driver};
-  }
-  return {"processor", driver};
-}
-
-void check_device(const char* backend, const BackendOptions& options) {
-  if (!options.device.empty() && options.device != "0") {
-    throw Error(std::string(backend) + ": no device '" + options.device + "'; it has one, 0");
-  }
+std::unique_ptr<Backend> make_host_backend(const char* name, DeviceInfo device, const HostOps& ops, int threads,
+                                           Chunks chunks) {
+  return std::make_unique<HostBackend>(name, std::move(device), ops, threads, chunks);
 }
 
 }  // namespace berth::host

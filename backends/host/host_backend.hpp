@@ -19,16 +19,27 @@ struct HostOp {
   /// that it cannot do, which `other` does by groups.
   int (*parts)(const void* params) = nullptr;
   RunGroups other = nullptr;
+  /// Works in the stream's workspace, which lies behind the last buffer; only where it does the whole operation.
+  bool workspace = false;
 };
 
 /// A table of operations by Op, filled by a CPU backend.
 struct HostOps {
   HostOp ops[32];
+  /// Makes a stream's workspace, where any operation needs one. What it takes then or in a plan's first run it keeps.
+  std::shared_ptr<void> (*make_workspace)() = nullptr;
+};
+
+/// How buffers are taken from operator new.
+enum class Chunks {
+  shared,  ///< many lie in a chunk that the system may put on pages of 2 MB; in sanitizers' builds as `single`
+  single,  ///< each has one to itself, no larger than it must be
 };
 
 /// A backend whose buffers are host memory and whose operations are functions; work is done while it is enqueued.
 /// `threads` share an operation's groups (0: every core).
-std::unique_ptr<Backend> make_host_backend(const char* name, DeviceInfo device, const HostOps& ops, int threads);
+std::unique_ptr<Backend> make_host_backend(const char* name, DeviceInfo device, const HostOps& ops, int threads,
+                                           Chunks chunks = Chunks::shared);
 
 /// This machine's processor as the device of a CPU backend; `driver` says what runs on it.
 DeviceInfo processor(const std::string& driver);

@@ -10,6 +10,7 @@
 
 #include "berth/types.hpp"
 #include "reference/layout.hpp"
+#include "simd/workspace.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
@@ -18,10 +19,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using RowTag = hn::ScalableTag<u32>;
 using RowWords = hn::Vec<RowTag>;
-
-/// Words in the widest row (16384 px), and the most that a vector has.
-constexpr int kMaxRowWords = 512;
-constexpr int kRowSlack = 64;
 
 HWY_INLINE int row_lanes() { return static_cast<int>(hn::Lanes(RowTag())); }
 HWY_INLINE u32 popcount(u32 word) { return static_cast<u32>(__builtin_popcount(word)); }

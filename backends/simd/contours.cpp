@@ -2,10 +2,10 @@
 // little is done between them, and that two contours are walked at a time, neither waiting for the other's loads.
 #include <algorithm>
 #include <cstring>
-#include <vector>
 
 #include "reference/layout.hpp"
 #include "simd/simd_ops.hpp"
+#include "simd/workspace.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/contours.cpp"
@@ -22,53 +22,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 HWY_INLINE int node_x(u32 node) { return static_cast<int>(node & 0xffffu); }
 HWY_INLINE int node_step(u32 node) { return static_cast<int>(node) >> 16; }
-
-/// Some walk from a top; its path has room for the longest, and a vector.
-struct Walk {
-  int first;
-  int y;
-  u32 stamp;
-  u32 row_begin;
-  std::ptrdiff_t id;
-  int count;
-  std::vector<u32> ids, nodes;
-};
-
-/// What contour_measure keeps from frame to frame, so that frames allocate nothing.
-struct WalkMemory {
-  // By which walk a node was last seen. A frame's stamps rise from top to top and lie below those of all earlier
-  // frames, so nothing needs to be wiped.
-  std::vector<u32> stamps;
-  u32 least_stamp = ~0u;
-  std::vector<u32> row_begins;  // the first run end of every row, and of the one after the last
-  std::vector<u32> tops;
-  Walk walks[2];
-
-  void make_room(const contour_measure_params& p, std::size_t most_nodes) {
-    constexpr std::size_t kOverhang = 64;
-    const auto grow = [](auto& list, std::size_t room, u32 value) {
-      if (list.size() < room) list.resize(room, value);
-    };
-    const std::size_t capacity = static_cast<std::size_t>(p.capacity);
-    grow(stamps, capacity, ~0u);
-    grow(row_begins, static_cast<std::size_t>(p.height) + 1, 0);
-    grow(tops, capacity / 2 + kOverhang, 0);
-    for (Walk& walk : walks) {
-      grow(walk.ids, most_nodes + kOverhang, 0);
-      grow(walk.nodes, most_nodes + kOverhang, 0);
-    }
-  }
-
-  /// The first of that many stamps.
-  u32 take_stamps(u32 count) {
-    if (least_stamp <= count) {
-      std::fill(stamps.begin(), stamps.end(), ~0u);
-      least_stamp = ~0u;
-    }
-    least_stamp -= count;
-    return least_stamp;
-  }
-};
 
 // A walk ends on a node that an earlier one has seen, for then an earlier top is on the contour; above its top's row,
 // for the same reason; and on its own first node. So no node is walked over twice, but for what two walks on one
@@ -280,9 +233,9 @@ class Measurer {
   int y_ = 0;      // the row of the last begun
 };
 
-void contour_measure(const contour_measure_params& p, const u32* nodes, const u32* offsets, u32* spans) {
-  static thread_local WalkMemory kept_memory;
-  WalkMemory& memory = kept_memory;
+void contour_measure(Workspace& workspace, const contour_measure_params& p, const u32* nodes, const u32* offsets,
+                     u32* spans) {
+  WalkMemory& memory = workspace.walks;
   memory.make_room(p, static_cast<std::size_t>(std::min(p.max_side, p.height)) * 5 / 2 + 4);
   u32* const row_begins = memory.row_begins.data();
   for (int y = 0; y <= p.height; ++y) row_begins[y] = reference::run_ends_before(offsets, p.base_at, y * p.row_words);
@@ -383,8 +336,9 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace berth::simd_backend {
 BERTH_SIMD_DISPATCH(contour_measure,
-                    (const contour_measure_params& p, const u32* nodes, const u32* offsets, u32* spans),
-                    (p, nodes, offsets, spans))
+                    (Workspace & workspace, const contour_measure_params& p, const u32* nodes, const u32* offsets,
+                     u32* spans),
+                    (workspace, p, nodes, offsets, spans))
 BERTH_SIMD_DISPATCH(contour_collect,
                     (const contour_collect_params& p, const u32* spans, const u32* offsets, u32* contours),
                     (p, spans, offsets, contours))

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "simd/simd_ops.hpp"
+#include "simd/workspace.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/quad_fit.cpp"
@@ -24,30 +25,28 @@ namespace hn = hwy::HWY_NAMESPACE;
 #undef U32
 #undef S32
 
-/// Points of one contour, twice over so that arcs may pass the first point, with room for a vector's overhang.
+/// A contour as it is searched.
 struct Points {
-  std::vector<s32> x;
-  std::vector<s32> y;  // row centres
+  explicit Points(ContourPoints& room) : memory(room) {}
+
+  ContourPoints& memory;
+  const s32* x = nullptr;
+  const s32* y = nullptr;
   const u32* words = nullptr;
   int count = 0;
   s32 area = 0;
   s32 x_min = 0, x_max = 0, y_min = 0, y_max = 0;
 
-  void make_room(int most) {
-    const std::size_t room = static_cast<std::size_t>(most) * 2 + 64;
-    if (x.size() >= room) return;
-    x.resize(room);
-    y.resize(room);
-  }
-
   /// Reads up to a vector past the last point, as the buffers of CPU backends allow.
   HWY_ATTR void load(const u32* point_words, int point_count) {
-    make_room(point_count);
+    memory.make_room(point_count);
     words = point_words;
     count = point_count;
     const std::size_t n = static_cast<std::size_t>(count);
-    s32* const xs = x.data();
-    s32* const ys = y.data();
+    s32* const xs = memory.x.data();
+    s32* const ys = memory.y.data();
+    x = xs;
+    y = ys;
     const hn::ScalableTag<s32> lanes;
     const std::size_t step = hn::Lanes(lanes);
     const auto one = hn::Set(lanes, 1);
@@ -335,11 +334,10 @@ class Quad {
   s32 shortest_ = 0;
 };
 
-void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads) {
-  static thread_local Points kept;
-  Points& loaded = kept;
+void quad_fit(Workspace& workspace, const quad_fit_params& p, const u32* contours, const u32* points, s32* quads) {
+  Points loaded(workspace.points);
   // What contour_measure lets through has no more points: nothing is taken while frames fly.
-  loaded.make_room(p.max_height * 5 / 2 + 4);
+  workspace.points.make_room(p.max_height * 5 / 2 + 4);
   const u32* record = contours + CONTOUR_HEADER;
   const int filled = static_cast<int>(std::min(contours[1], static_cast<u32>(p.max_contours)));
   for (int slot = 0; slot < filled; ++slot, record += CONTOUR_WORDS, quads += QUAD_WORDS) {
@@ -362,7 +360,9 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace berth::simd_backend {
-BERTH_SIMD_DISPATCH(quad_fit, (const quad_fit_params& p, const u32* contours, const u32* points, s32* quads),
-                    (p, contours, points, quads))
+BERTH_SIMD_DISPATCH(quad_fit,
+                    (Workspace & workspace, const quad_fit_params& p, const u32* contours, const u32* points,
+                     s32* quads),
+                    (workspace, p, contours, points, quads))
 }  // namespace berth::simd_backend
 #endif

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "simd/simd_ops.hpp"
+#include "simd/workspace.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/run_link.cpp"
@@ -16,18 +17,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace berth::simd_backend::HWY_NAMESPACE {
-
-/// Words in which overlaps begin: where, the changes of the rows above and here, and the ids of the last run ends
-/// before the word.
-struct OverlapWords {
-  static constexpr int kRoom = 1024;
-  static constexpr int kSize = kRoom + kMaxRowWords + kRowSlack;
-  u32 begins[kSize];
-  u32 above[kSize];
-  u32 here[kSize];
-  u32 up[kSize];
-  u32 low[kSize];
-};
 
 /// The id of the last run end before each of the words from `word` on; a vector has words of two groups at most.
 HWY_INLINE RowWords last_before(const u32* offsets, int base_at, int word) {
@@ -71,14 +60,6 @@ HWY_NOINLINE int list_overlaps(const u32* row, int row_words, const u32* offsets
   }
   return count;
 }
-
-/// Overlaps in raster order, by the starts of their runs; the one before the first is kept in front.
-struct Overlaps {
-  static constexpr int kBatch = 2;
-  static constexpr int kSize = 1 + OverlapWords::kSize * 16 + kRowSlack;
-  u32 up[kSize];
-  u32 low[kSize];
-};
 
 /// The overlaps that begin in a list of words: returns how many. A run's start is the last change at or before an
 /// overlap's first pixel.
@@ -147,7 +128,8 @@ HWY_NOINLINE void link(Overlaps& overlaps, int count, u32* nodes) {
   overlaps.low[0] = low[count - 1];
 }
 
-void run_link(const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks, u32* nodes) {
+void run_link(Workspace& workspace, const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks,
+              u32* nodes) {
   const int row_words = p.row_words;
   const int base_at = p.base_at;
   const int rows = kept_rows(p, offsets);
@@ -164,10 +146,8 @@ void run_link(const run_link_params& p, const u32* bits, const u32* offsets, con
   }
   for (; id < kept; ++id) nodes[id] = cracks[id] | (id % 2 == 0 ? 0x00010000u : 0xffff0000u);
 
-  static thread_local OverlapWords kept_list;
-  static thread_local Overlaps kept_overlaps;
-  OverlapWords& list = kept_list;
-  Overlaps& overlaps = kept_overlaps;
+  OverlapWords& list = workspace.overlap_words;
+  Overlaps& overlaps = workspace.overlaps;
   overlaps.up[0] = overlaps.low[0] = ~0u;
   RowAbove above = {};  // white lies above the first row
   for (int y = 0; y < rows;) {
@@ -187,7 +167,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace berth::simd_backend {
 BERTH_SIMD_DISPATCH(run_link,
-                    (const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks, u32* nodes),
-                    (p, bits, offsets, cracks, nodes))
+                    (Workspace & workspace, const run_link_params& p, const u32* bits, const u32* offsets,
+                     const u32* cracks, u32* nodes),
+                    (workspace, p, bits, offsets, cracks, nodes))
 }  // namespace berth::simd_backend
 #endif

@@ -11,20 +11,26 @@ void halve(const halve_params& p, const u32* pixels, u32* half_pixels);
 void tile_extrema(const tile_extrema_params& p, const u32* pixels, u32* minima, u32* maxima);
 void tile_histogram(const tile_histogram_params& p, const u32* minima, const u32* maxima, u32* histograms);
 void normalize(const normalize_params& p, const u32* histograms, u32* levels);
-void threshold(const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima, const u32* levels,
-               u32* bits);
 void despeckle(const despeckle_params& p, const u32* bits, u32* clean);
 void run_count(const run_count_params& p, const u32* bits, u32* offsets);
 void scan(const scan_params& p, u32* values);
 void run_emit(const run_emit_params& p, const u32* bits, const u32* offsets, u32* cracks);
-void run_link(const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks, u32* nodes);
-void contour_measure(const contour_measure_params& p, const u32* nodes, const u32* offsets, u32* spans);
 void contour_collect(const contour_collect_params& p, const u32* spans, const u32* offsets, u32* contours);
 void contour_trace(const contour_trace_params& p, const u32* nodes, const u32* contours, u32* points);
-void quad_fit(const quad_fit_params& p, const u32* contours, const u32* points, s32* quads);
 void edge_refine(const edge_refine_params& p, const u32* pixels, const u32* levels, const s32* quads, s32* edges);
 void normalize_window(const normalize_window_params& p, const u32* pixels, const s32* statistics, u32* tensor);
 void max_pool(const max_pool_params& p, const u32* tensor, u32* out_tensor);
+
+struct Workspace;
+
+/// Those that need room to work in.
+void threshold(Workspace& workspace, const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima,
+               const u32* levels, u32* bits);
+void run_link(Workspace& workspace, const run_link_params& p, const u32* bits, const u32* offsets, const u32* cracks,
+              u32* nodes);
+void contour_measure(Workspace& workspace, const contour_measure_params& p, const u32* nodes, const u32* offsets,
+                     u32* spans);
+void quad_fit(Workspace& workspace, const quad_fit_params& p, const u32* contours, const u32* points, s32* quads);
 
 /// Operations that threads share, a part each: parts [first, last). How many parts there are is 0 for parameters that
 /// only the kernel text can do.

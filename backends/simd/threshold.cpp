@@ -3,6 +3,7 @@
 
 #include "reference/reference.hpp"
 #include "simd/simd_ops.hpp"
+#include "simd/workspace.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "simd/threshold.cpp"
@@ -17,15 +18,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET != HWY_SCALAR
 
-constexpr std::size_t kMaxTiles = 4096;  // in a row of 16384 px
-constexpr std::size_t kMargin = 64;
-
-/// Extrema over 3 × 3 tiles need a tile beyond either end of the row: the outermost once more.
-struct TileRow {
-  alignas(64) u8 low[kMaxTiles + 2 * kMargin];
-  alignas(64) u8 high[kMaxTiles + 2 * kMargin];
-  alignas(64) u8 limit[kMaxTiles + 2 * kMargin];
-};
+constexpr std::size_t kMargin = TileRow::kMargin;
 
 // Sets row.limit to the least level that is not black: one above the cut, or 0 where the tiles' contrast does not
 // suffice.
@@ -67,8 +60,8 @@ void find_limits(TileRow& row, const u8* const (&low)[3], const u8* const (&high
 
 #endif  // HWY_TARGET != HWY_SCALAR
 
-void threshold(const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima, const u32* levels,
-               u32* bits) {
+void threshold([[maybe_unused]] Workspace& workspace, const threshold_params& p, const u32* pixels, const u32* minima,
+               const u32* maxima, const u32* levels, u32* bits) {
 #if HWY_TARGET == HWY_SCALAR  // a processor without any vectors Highway knows
   reference::threshold(p, pixels, minima, maxima, levels, bits);
 #else
@@ -84,7 +77,7 @@ void threshold(const threshold_params& p, const u32* pixels, const u32* minima, 
   const std::size_t tiles = stride / 4;
   const u32 last_mask = p.width % 32 == 0 ? ~0u : (1u << (p.width % 32)) - 1u;
   const auto spread = hn::Set(words, 0x01010101u);
-  static thread_local TileRow row;
+  TileRow& row = workspace.tiles;
   for (int ty = 0; ty < p.tile_rows; ++ty) {
     const u8* low[3];
     const u8* high[3];
@@ -120,8 +113,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace berth::simd_backend {
 BERTH_SIMD_DISPATCH(threshold,
-                    (const threshold_params& p, const u32* pixels, const u32* minima, const u32* maxima,
-                     const u32* levels, u32* bits),
-                    (p, pixels, minima, maxima, levels, bits))
+                    (Workspace & workspace, const threshold_params& p, const u32* pixels, const u32* minima,
+                     const u32* maxima, const u32* levels, u32* bits),
+                    (workspace, p, pixels, minima, maxima, levels, bits))
 }  // namespace berth::simd_backend
 #endif

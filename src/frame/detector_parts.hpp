@@ -14,9 +14,9 @@ namespace berth {
 /// backend have as many frames in flight. All memory is taken in the constructor.
 class DeviceFrame {
  public:
-  /// Runs an empty frame first where there is a driver, which may finish compiling only then. `keeps_stages`: what
-  /// every window's plan writes stays until its next frame, for digests and comparisons; else windows share all that
-  /// the host does not read. Throws Error as Detector.
+  /// Runs an empty frame first: drivers may finish compiling only then, and operations take what they work in.
+  /// `keeps_stages`: what every window's plan writes stays until its next frame, for digests and comparisons; else
+  /// windows share all that the host does not read. Throws Error as Detector.
   DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages = true);
   DeviceFrame(const DeviceFrame&) = delete;
   DeviceFrame& operator=(const DeviceFrame&) = delete;
@@ -36,8 +36,6 @@ class DeviceFrame {
   void submit_windows(View2D<const u8> frame, const std::vector<SearchWindow>& windows);
   /// Waits for the frame. Returns false when the device was lost.
   bool finish();
-  /// Runs the plan on whatever the buffers hold, for this thread's first touch of what operations keep by thread.
-  bool warm_up();
 
   /// What was submitted last: the whole frame, or windows.
   const std::vector<SearchArea*>& areas() const { return areas_; }
@@ -57,6 +55,7 @@ class DeviceFrame {
   std::size_t host_bytes() const;
 
  private:
+  bool warm_up();
   void make_windows(Backend& backend, const DetectorConfig& config, bool keeps_stages);
   SearchArea& free_area(const SearchWindow& window);
   void end_submit();

@@ -23,7 +23,8 @@ DeviceFrame::DeviceFrame(Backend& backend, int width, int height, const Detector
   make_windows(backend, config, keeps_stages);
   areas_.reserve(windows_.size() + 1);
   areas_.push_back(&whole_);
-  if (!stream_->is_immediate() && !warm_up()) {  // not in the first frame's time
+  // What a driver compiles, and what operations take when they first run, is not in the first frame's time.
+  if (!warm_up()) {
     throw Error(std::string(backend.name()) + ": " + backend.device().name +
                 " was lost on the first, empty frame; see berth doctor, or use another backend");
   }
@@ -112,6 +113,7 @@ bool DeviceFrame::finish() {
   return alive;
 }
 
+/// Runs the plans on whatever the buffers hold.
 bool DeviceFrame::warm_up() {
   stream_->replay(whole_.plan.plan());
   for (const auto& window : windows_) stream_->replay(window->plan.plan());

@@ -161,8 +161,6 @@ struct Pipeline::Impl {
   void run_device(std::promise<void>& ready) {
     try {
       set_up(0);
-      // Operations may keep memory by thread, which they take when they first run.
-      for (const std::unique_ptr<DeviceFrame>& device : slots.front().devices) device->warm_up();
       ready.set_value();
     } catch (...) {
       ready.set_exception(std::current_exception());
