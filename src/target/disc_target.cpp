@@ -7,7 +7,6 @@
 #include "berth/error.hpp"
 #include "exact_math.hpp"
 #include "pose_algebra.hpp"
-#include "target/file_field.hpp"
 #include "target/number_text.hpp"
 
 namespace berth {
@@ -24,7 +23,6 @@ constexpr double kGap = 0.25;
 constexpr double kThin = 0.1, kSame = 0.05;
 // Of two sizes that an image tells apart.
 constexpr double kSameSize = 0.2;
-constexpr const char* kExample = "see docs/disc-targets.md for an example file";
 
 Vec2 place(const TargetDisc& disc) { return {disc.x_m, disc.y_m}; }
 Vec2 less(const Vec2& a, const Vec2& b) { return {a[0] - b[0], a[1] - b[1]}; }
@@ -177,38 +175,6 @@ void DiscTarget::check() const {
   check_spread(*this, which, middle, reach_m);
   check_gaps(*this, which);
   check_turns(*this, which, middle, reach_m);
-}
-
-DiscTarget read_disc_target(const std::string& path) {
-  const FileField root = FileField::open(path, "target file", kExample);
-  const FileField field = root.at("disc_target", kExample);
-  field.allow_only({"name", "deviation", "discs", "bars"});
-  DiscTarget target;
-  target.name = field.at("name", "give the target a name").text();
-  target.deviation_m = field.metres_or("deviation", 0);
-  for (const FileField& one : field.at("discs", kExample).items("list the discs")) {
-    one.allow_only({"x", "y", "diameter", "hole"});
-    const auto metres = [&](const char* key) { return one.at(key, "give metres").metres(); };
-    target.discs.push_back({metres("x"), metres("y"), metres("diameter"), one.metres_or("hole", 0)});
-  }
-  if (field.has("bars")) {
-    for (const FileField& one : field.at("bars", "").items("list the bars")) {
-      one.allow_only({"from", "to", "width"});
-      const auto point = [&](const char* key) {
-        const FileField value = one.at(key, "give [x, y] in metres");
-        const std::vector<FileField> two = value.items("give [x, y] in metres");
-        if (two.size() != 2) value.fail("not two numbers", "give [x, y] in metres");
-        return std::array<double, 2>{two[0].metres(), two[1].metres()};
-      };
-      target.bars.push_back({point("from"), point("to"), one.at("width", "give metres").metres()});
-    }
-  }
-  try {
-    target.check();
-  } catch (const Error& error) {
-    throw Error(path + ": " + error.what());
-  }
-  return target;
 }
 
 }  // namespace berth
