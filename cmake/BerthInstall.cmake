@@ -43,7 +43,12 @@ install(EXPORT berthCppTargets NAMESPACE berth:: DESTINATION ${package_dir} COMP
 # From where the .pc files are to the prefix, so that a tree can be moved.
 file(RELATIVE_PATH BERTH_PC_TO_PREFIX /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
 string(REGEX REPLACE "/$" "" BERTH_PC_TO_PREFIX "${BERTH_PC_TO_PREFIX}")
-foreach(name IN ITEMS berth berth-cpp)
+set(pc_files berth berth-cpp)
+if(TARGET berth::core)
+  install(FILES ${PROJECT_BINARY_DIR}/libberth-core.a DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+  list(APPEND pc_files berth-core)
+endif()
+foreach(name IN LISTS pc_files)
   configure_file(${CMAKE_CURRENT_LIST_DIR}/${name}.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 endforeach()

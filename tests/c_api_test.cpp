@@ -19,6 +19,7 @@
 #include "berth/source.hpp"
 #include "camera/image_file.hpp"
 #include "sim/scenario.hpp"
+#include "support/command_output.hpp"
 #include "support/command_run.hpp"
 #include "support/counted_allocations.hpp"
 
@@ -45,15 +46,6 @@ T empty() {
   T value{};
   value.struct_size = sizeof(T);
   return value;
-}
-
-/// What a command prints, and its exit status.
-std::pair<std::string, int> output_of(const std::string& command) {
-  std::FILE* output = popen(command.c_str(), "r");
-  std::string text;
-  char part[4096];
-  while (std::fgets(part, sizeof part, output) != nullptr) text += part;
-  return {text, pclose(output)};
 }
 
 GrayImage photo() { return read_gray_image(BERTH_TEST_DATA "/tag36h11_7.png"); }
@@ -103,7 +95,8 @@ TEST(CApi, TheExamplePrintsThePose) {
   const std::string header = "P5\n" + std::to_string(image.width()) + " " + std::to_string(image.height()) + "\n255\n";
   const std::string pixels(reinterpret_cast<const char*>(image.view().data),
                            static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()));
-  const auto [text, status] = output_of(std::string(BERTH_C_EXAMPLE) + " " + folder.write("dock.pgm", header + pixels));
+  const auto [text, status] =
+      test::output_of(std::string(BERTH_C_EXAMPLE) + " " + folder.write("dock.pgm", header + pixels));
   EXPECT_EQ(status, 0);
 
   const auto backend = open_backend("simd");
@@ -425,7 +418,7 @@ TEST(CApi, TheLibraryShowsTheHeadersFunctionsAndNoMore) {
     if (line.empty() || line[0] < 'a' || line[0] > 'z' || end == std::string::npos) continue;
     declared.insert(line.substr(line.rfind(' ', end) + 1, end - line.rfind(' ', end) - 1));
   }
-  const auto [text, status] = output_of("nm -D --defined-only --format=posix '" BERTH_C_LIBRARY "'");
+  const auto [text, status] = test::output_of("nm -D --defined-only --format=posix '" BERTH_C_LIBRARY "'");
   ASSERT_EQ(status, 0);
   std::set<std::string> exported;
   std::istringstream symbols(text);

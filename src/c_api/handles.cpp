@@ -55,6 +55,25 @@ CameraModel camera_of(const berth_camera* camera) {
   return model;
 }
 
+CornerMethod corner_method_of(int32_t method) {
+  if (method != BERTH_CORNERS_EDGES && method != BERTH_CORNERS_PHOTOMETRIC) {
+    throw BadArgument("method is " + std::to_string(method) + "; use a berth_corner_method");
+  }
+  return method == BERTH_CORNERS_EDGES ? CornerMethod::edges : CornerMethod::photometric;
+}
+
+PoseMethod pose_method_of(int32_t method) {
+  if (method != BERTH_POSE_LEAST_SQUARES && method != BERTH_POSE_PAPER) {
+    throw BadArgument("method is " + std::to_string(method) + "; use a berth_pose_method");
+  }
+  return method == BERTH_POSE_LEAST_SQUARES ? PoseMethod::least_squares : PoseMethod::paper;
+}
+
+int full_every_of(int32_t full_every) {
+  if (full_every < 0) throw BadArgument("full_every is " + std::to_string(full_every) + "; give 0 or more frames");
+  return full_every;
+}
+
 void write_camera(const CameraModel& model, berth_camera* camera) {
   berth_camera value{};
   value.width = model.width;

@@ -45,6 +45,10 @@ namespace berth::c_api {
 
 /// Throws BadArgument on a lens that there is not.
 CameraModel camera_of(const berth_camera* camera);
+/// These throw BadArgument on a number that means nothing.
+CornerMethod corner_method_of(int32_t method);
+PoseMethod pose_method_of(int32_t method);
+int full_every_of(int32_t full_every);
 void write_camera(const CameraModel& model, berth_camera* camera);
 
 berth_pose pose_of(const Pose& pose);

@@ -30,14 +30,8 @@ berth_code change(berth_settings* settings, berth_error* error, Change make) {
 
 extern "C" {
 
-const char* berth_version(void) { return BERTH_LIBRARY_VERSION; }
-
 berth_code berth_camera_read(berth_camera* camera, const char* path, berth_error* error) {
   return guarded(error, [&] { write_camera(read_camera(&needed(path, "path")), camera); });
-}
-
-berth_code berth_camera_paper(berth_camera* camera, int32_t width, int32_t height, berth_error* error) {
-  return guarded(error, [&] { write_camera(paper_camera(width, height), camera); });
 }
 
 const char* berth_backend_name(size_t index) {
@@ -64,10 +58,6 @@ const char* berth_backend_description(const berth_backend* backend) {
 }
 
 void berth_backend_close(berth_backend* backend) { delete backend; }
-
-const char* berth_family_name(size_t index) {
-  return index < family_names().size() ? family_names()[index].c_str() : nullptr;
-}
 
 berth_settings* berth_settings_new(berth_error* error) {
   return opened(error, [] { return new berth_settings; });
@@ -130,21 +120,11 @@ berth_code berth_settings_set_max_hamming(berth_settings* settings, int32_t bits
 }
 
 berth_code berth_settings_set_corner_method(berth_settings* settings, berth_corner_method method, berth_error* error) {
-  return change(settings, error, [&](berth_settings& s) {
-    if (method != BERTH_CORNERS_EDGES && method != BERTH_CORNERS_PHOTOMETRIC) {
-      throw BadArgument("method is " + std::to_string(method) + "; use a berth_corner_method");
-    }
-    s.config.corner_method = method == BERTH_CORNERS_EDGES ? CornerMethod::edges : CornerMethod::photometric;
-  });
+  return change(settings, error, [&](berth_settings& s) { s.config.corner_method = corner_method_of(method); });
 }
 
 berth_code berth_settings_set_pose_method(berth_settings* settings, berth_pose_method method, berth_error* error) {
-  return change(settings, error, [&](berth_settings& s) {
-    if (method != BERTH_POSE_LEAST_SQUARES && method != BERTH_POSE_PAPER) {
-      throw BadArgument("method is " + std::to_string(method) + "; use a berth_pose_method");
-    }
-    s.config.pose_method = method == BERTH_POSE_LEAST_SQUARES ? PoseMethod::least_squares : PoseMethod::paper;
-  });
+  return change(settings, error, [&](berth_settings& s) { s.config.pose_method = pose_method_of(method); });
 }
 
 berth_code berth_settings_set_corner_deviation(berth_settings* settings, double deviation_px, berth_error* error) {
@@ -160,10 +140,7 @@ berth_code berth_settings_set_flat_field(berth_settings* settings, const float* 
 }
 
 berth_code berth_settings_set_tracking(berth_settings* settings, int32_t full_every, berth_error* error) {
-  return change(settings, error, [&](berth_settings& s) {
-    if (full_every < 0) throw BadArgument("full_every is " + std::to_string(full_every) + "; give 0 or more frames");
-    s.full_every = full_every;
-  });
+  return change(settings, error, [&](berth_settings& s) { s.full_every = full_every_of(full_every); });
 }
 
 }  // extern "C"
