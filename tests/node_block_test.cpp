@@ -37,20 +37,33 @@ class Blocks {
   bool coin(int one_in) { return integer(1, one_in) == 1; }
 
   // Coordinates that stay within four modules: slopes that take up to `reach` of them, the rest is for the constant.
-  std::array<std::int32_t, 6> coordinate() {
+  NodeCoordinate coordinate() {
     const int reach = integer(0, 110000);
     const int x = integer(-reach, reach) / 4, y = integer(-(reach - std::abs(4 * x)), reach - std::abs(4 * x)) / 4;
-    std::array<std::int32_t, 6> q = {0, x, y, integer(-100, 100), integer(-100, 100), integer(-100, 100)};
+    const auto bend = [&] { return static_cast<std::int16_t>(integer(-100, 100)); };
     const int used = 4 * (std::abs(x) + std::abs(y)) + 16 * 300;
-    q[0] = integer(used, 4 * 65536 - 1 - used);
-    return q;
+    return {integer(used, 4 * 65536 - 1 - used),
+            {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), bend(), bend(), bend()}};
+  }
+
+  NodePlace place() {
+    NodePlace m;
+    m.row_step = integer(1, 2);
+    m.gain_u = static_cast<std::int16_t>(integer(16384, 32767));
+    m.gain_v = static_cast<std::int16_t>(integer(16384, 32767));
+    m.doublings_u = integer(0, 5);
+    m.doublings_v = integer(0, 5);
+    m.correlation = static_cast<std::int16_t>(coin(4) ? 0 : integer(-29490, 29490));
+    m.half_square = static_cast<std::int16_t>(m.correlation * m.correlation >> 16);
+    m.tone = static_cast<std::int16_t>(coin(4) ? 0 : integer(-29491, 29491));
+    m.most_residual = static_cast<std::int16_t>(coin(3) ? integer(0, 2032) : 2032);
+    return m;
   }
 
   NodeBlock block(int x, int y) {
     NodeBlock m;
     m.x = x;
     m.y = y;
-    m.row_step = 1 << integer(0, 2);
     m.u = coordinate();
     m.v = coordinate();
     m.whole = coin(2);
@@ -58,10 +71,6 @@ class Blocks {
     m.u_last = m.whole ? 4 * 65536 : integer(65536, 4 * 65536);
     m.v_first = m.whole ? 0 : integer(0, 131072);
     m.v_last = m.whole ? 4 * 65536 : integer(65536, 4 * 65536);
-    m.gain_u = static_cast<std::int16_t>(integer(16384, 32767));
-    m.gain_v = static_cast<std::int16_t>(integer(16384, 32767));
-    m.doublings_u = integer(0, 5);
-    m.doublings_v = integer(0, 5);
     m.all_known = true;
     const bool even = coin(4);
     for (std::size_t k = 0; k < 16; ++k) {
@@ -76,9 +85,6 @@ class Blocks {
       m.nodes.both[k] = byte(a + d - b - c);
       m.nodes.known[k] = known ? -1 : 0;
     }
-    m.correlation = static_cast<std::int16_t>(coin(4) ? 0 : integer(-29490, 29490));
-    m.half_square = static_cast<std::int16_t>(m.correlation * m.correlation >> 16);
-    m.tone = static_cast<std::int16_t>(coin(4) ? 0 : integer(-29491, 29491));
     const bool extreme = coin(4);
     m.dark = integer(extreme ? -511999 : 0, extreme ? 511999 : 60000);
     for (auto* const steps : {&m.dark_step, &m.contrast_step}) {
@@ -86,7 +92,6 @@ class Blocks {
     }
     const int least = 4 * (std::abs(m.contrast_step[0]) + std::abs(m.contrast_step[1])) - 261119;
     m.contrast = integer(extreme ? least : 20000, extreme ? -least : 110000);
-    m.most_residual = static_cast<std::int16_t>(coin(3) ? integer(0, 2032) : 2032);
     return m;
   }
 
@@ -96,7 +101,7 @@ class Blocks {
 
 void expect_equal(const PlaceSums& expected, const PlaceSums& got, const char* target, int trial) {
   for (std::size_t row = 0; row < PlaceSums::kRows; ++row) {
-    ASSERT_EQ(expected.total(row), got.total(row)) << target << ", block " << trial << ", row " << row;
+    ASSERT_EQ(expected.rows[row], got.rows[row]) << target << ", place " << trial << ", row " << row;
   }
 }
 
@@ -116,11 +121,16 @@ void compare(const char* target) {
     PlaceSums expected, got;
     expected.clear();
     got.clear();
-    // Four blocks a place: sums grow.
-    for (int part = 0; part < 4; ++part) {
-      const NodeBlock block = blocks.block(blocks.integer(4, kSize - 4), blocks.integer(4, kSize - 4));
-      reference::add_block(image.view(), profile.pieces(), block, expected);
-      add_block(image.view(), profile.pieces(), block, got);
+    // Up to four blocks a place at once, twice: sums grow.
+    for (int turn = 0; turn < 2; ++turn) {
+      NodeBlocks together;
+      together.place = blocks.place();
+      together.count = static_cast<std::size_t>(blocks.integer(0, NodeBlocks::kMost));
+      for (std::size_t i = 0; i < together.count; ++i) {
+        together.blocks[i] = blocks.block(blocks.integer(4, kSize - 4), blocks.integer(4, kSize - 4));
+        reference::add_block(image.view(), profile.pieces(), together.place, together.blocks[i], expected);
+      }
+      add_blocks(image.view(), profile.pieces(), together, got);
     }
     ASSERT_NO_FATAL_FAILURE(expect_equal(expected, got, target, trial));
     const PixelCounts counts = expected.counts();
@@ -128,7 +138,7 @@ void compare(const char* target) {
     edges += counts.on_edges;
     pairs += counts.pairs;
     saturated += counts.saturated;
-    EXPECT_EQ(counts.pixels, expected.total(0));
+    EXPECT_EQ(counts.pixels, expected.rows[0]);
   }
   // The blocks show what they are meant to.
   EXPECT_GT(pixels, 50000);

@@ -16,8 +16,6 @@ constexpr double kFromEnd = 1.2;
 // A module this many deviations of the blur wide hides its far edge from every pixel: at mid-module it is over but for
 // 0.0013 of the contrast.
 constexpr double kWideModule = 6;
-// What NodeBlock's 16 bits have room for, grey levels.
-constexpr double kMostDark = 1000, kMostContrast = 510, kMostToneStep = 7.8;
 
 // To the nearest, without a branch; below 2^29 in size. The cast rounds towards zero, so it is given what is positive.
 int rounded(double value) {
@@ -34,28 +32,11 @@ std::array<int, 6> q22(const Quadratic& q) {
           rounded(q.xx * k), rounded(q.xy * k), rounded(q.yy * k)};
 }
 
-// Four nodes wide along one axis, from the first that a block's pixels are nearest to.
-struct NodeSpan {
-  // `q`: marker coordinate, modules.
-  explicit NodeSpan(const Quadratic& q) {
-    constexpr double kRounding = 1e-3;
-    const double reach =
-        4 * (std::fabs(q.x) + std::fabs(q.y)) + 16 * (std::fabs(q.xx) + std::fabs(q.xy) + std::fabs(q.yy)) + kRounding;
-    low = q.c - reach;
-    high = q.c + reach;
-    fits = low > -64 && high < 64;
-    if (!fits) return;
-    first = static_cast<int>(low + 64.5) - 64;
-    fits = static_cast<int>(high + 64.5) - 64 - first < 4;
-  }
-  std::array<std::int32_t, 6> from_first(const Quadratic& q) const {
-    return {q16(q.c - first + 0.5), q16(q.x), q16(q.y), q16(q.xx), q16(q.xy), q16(q.yy)};
-  }
-
-  double low, high;
-  bool fits;
-  int first = 0;
-};
+// A coordinate of a block that fits: below four modules in all, |x| + |y| + 4 (|xx| + |xy| + |yy|) is below 2^15.
+NodeCoordinate node_coordinate(const BlockGroup::Coordinate& from, std::size_t lane) {
+  const auto slope = [&](std::size_t k) { return static_cast<std::int16_t>(from.slopes[k][lane]); };
+  return {from.start[lane], {slope(0), slope(1), slope(2), slope(3), slope(4)}};
+}
 
 void set_gain(double deviation, std::int16_t& gain, int& doublings) {
   double eighth = 1 / (8 * deviation);
@@ -112,7 +93,8 @@ BlockModels::BlockModels(const FitScene& scene, const FitState& state, const Mar
       state_(state),
       map_(map),
       first_(std::max(-kOutside, 1.0 * scene.cells.first())),
-      per_side_(1 / state.side_px) {}
+      per_side_(1 / state.side_px),
+      source_{map.back(), first_, last(), state.dark, state.contrast, state.middle, per_side_} {}
 
 BlockModels::Range BlockModels::range() const {
   double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
@@ -133,14 +115,6 @@ BlockModels::Range BlockModels::range() const {
   return {block(low[0] - 1, w), block(high[0] + 2, w), block(low[1] - 1, h), block(high[1] + 2, h)};
 }
 
-bool BlockModels::outside(const Quadratic& u, const Quadratic& v) const {
-  const auto off = [&](const Quadratic& q) {
-    const double reach = 4.5 * (std::fabs(q.x) + std::fabs(q.y));
-    return q.c + reach < first_ || q.c - reach > last();
-  };
-  return off(u) || off(v);
-}
-
 double BlockModels::contrast(double x, double y) const {
   const auto& c = state_.contrast;
   return c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y;
@@ -151,12 +125,12 @@ BlockModels::Limits BlockModels::limits(double deviation) const {
   return {std::max(first_, start + kFromEnd * deviation), std::min(last(), end - kFromEnd * deviation)};
 }
 
-BlockModel BlockModels::model(int column, int row, const Quadratic& u, const Quadratic& v, const AxesBlur& blur) const {
+BlockModel BlockModels::model(const BlockGroup& group, std::size_t lane, const AxesBlur& blur) const {
   BlockModel m;
-  m.x = kSide * column + kSide / 2;
-  m.y = kSide * row + kSide / 2;
-  m.u = q22(u);
-  m.v = q22(v);
+  m.x = kSide * group.columns[lane] + kSide / 2;
+  m.y = kSide * group.rows[lane] + kSide / 2;
+  m.u = q22(group.u.at(lane));
+  m.v = q22(group.v.at(lane));
   const Limits limits_u = limits(blur.dev_u), limits_v = limits(blur.dev_v);
   m.u_first = q18(limits_u.first);
   m.u_last = q18(limits_u.last);
@@ -179,58 +153,46 @@ BlockModel BlockModels::model(int column, int row, const Quadratic& u, const Qua
   return m;
 }
 
-bool BlockModels::set_place(const AxesBlur& blur, NodeBlock& block) {
+bool BlockModels::set_place(const AxesBlur& blur, NodePlace& place) {
   if (blur.dev_u * kWideModule > 1 || blur.dev_v * kWideModule > 1) return false;
   limits_u_ = limits(blur.dev_u);
   limits_v_ = limits(blur.dev_v);
-  set_gain(blur.dev_u, block.gain_u, block.doublings_u);
-  set_gain(blur.dev_v, block.gain_v, block.doublings_v);
-  block.correlation = q15(blur.correlation);
-  block.half_square = q15(blur.correlation * blur.correlation / 2);
-  block.tone = q15(state_.tone);
-  block.most_residual = static_cast<std::int16_t>(rounded(std::min(127.0, state_.most_residual) * 16));
+  set_gain(blur.dev_u, place.gain_u, place.doublings_u);
+  set_gain(blur.dev_v, place.gain_v, place.doublings_v);
+  place.correlation = q15(blur.correlation);
+  place.half_square = q15(blur.correlation * blur.correlation / 2);
+  place.tone = q15(state_.tone);
+  place.most_residual = static_cast<std::int16_t>(rounded(std::min(127.0, state_.most_residual) * 16));
   return true;
 }
 
-bool BlockModels::set_block(int column, int row, const Quadratic& u, const Quadratic& v, NodeBlock& block) const {
-  block.x = kSide * column + kSide / 2;
-  block.y = kSide * row + kSide / 2;
+bool BlockModels::set_block(const BlockGroup& group, std::size_t lane, NodeBlock& block) const {
+  const auto q9_step = [&](double a_side) { return static_cast<std::int16_t>(rounded(a_side * per_side_ * 512)); };
+  block.x = kSide * group.columns[lane] + kSide / 2;
+  block.y = kSide * group.rows[lane] + kSide / 2;
   if (block.x + kSide / 2 > scene_.image.width || block.y + kSide / 2 > scene_.image.height) return false;
-  const NodeSpan span_u(u), span_v(v);
-  if (!span_u.fits || !span_v.fits) return false;
+  if ((group.fits >> lane & 1) == 0) return false;
+  block.dark = group.dark[lane];
+  block.contrast = group.contrast[lane];
+  block.dark_step = {q9_step(state_.dark[1]), q9_step(state_.dark[2])};
+  block.contrast_step = {static_cast<std::int16_t>(group.contrast_x[lane]),
+                         static_cast<std::int16_t>(group.contrast_y[lane])};
 
-  const double x = x_of(block.x), y = y_of(block.y);
-  const auto& d = state_.dark;
-  const auto& c = state_.contrast;
-  const double dark = d[0] + d[1] * x + d[2] * y, light = contrast(x, y);
-  const double dark_x = d[1] * per_side_, dark_y = d[2] * per_side_;
-  const double light_x = (c[1] + 2 * c[3] * x + c[4] * y) * per_side_;
-  const double light_y = (c[2] + c[4] * x + 2 * c[5] * y) * per_side_;
-  if (!(std::fabs(dark) < kMostDark && std::fabs(dark_x) < kMostToneStep && std::fabs(dark_y) < kMostToneStep &&
-        std::fabs(light_x) < kMostToneStep && std::fabs(light_y) < kMostToneStep &&
-        std::fabs(light) + 4 * (std::fabs(light_x) + std::fabs(light_y)) < kMostContrast)) {
-    return false;
-  }
-  const auto q9 = [](double level) { return rounded(level * 512); };
-  block.dark = q9(dark);
-  block.contrast = q9(light);
-  block.dark_step = {static_cast<std::int16_t>(q9(dark_x)), static_cast<std::int16_t>(q9(dark_y))};
-  block.contrast_step = {static_cast<std::int16_t>(q9(light_x)), static_cast<std::int16_t>(q9(light_y))};
-
-  block.u = span_u.from_first(u);
-  block.v = span_v.from_first(v);
-  block.whole = span_u.low >= limits_u_.first && span_u.high < limits_u_.last && span_v.low >= limits_v_.first &&
-                span_v.high < limits_v_.last;
+  block.u = node_coordinate(group.u, lane);
+  block.v = node_coordinate(group.v, lane);
+  const int first_u = group.u.first[lane], first_v = group.v.first[lane];
+  block.whole = group.u.low[lane] >= limits_u_.first && group.u.high[lane] < limits_u_.last &&
+                group.v.low[lane] >= limits_v_.first && group.v.high[lane] < limits_v_.last;
   if (!block.whole) {
-    block.u_first = q16(limits_u_.first - span_u.first + 0.5);
-    block.u_last = q16(limits_u_.last - span_u.first + 0.5);
-    block.v_first = q16(limits_v_.first - span_v.first + 0.5);
-    block.v_last = q16(limits_v_.last - span_v.first + 0.5);
+    block.u_first = q16(limits_u_.first - first_u + 0.5);
+    block.u_last = q16(limits_u_.last - first_u + 0.5);
+    block.v_first = q16(limits_v_.first - first_v + 0.5);
+    block.v_last = q16(limits_v_.last - first_v + 0.5);
   } else {
     block.u_first = block.v_first = 0;
     block.u_last = block.v_last = 4 << 16;
   }
-  set_nodes(scene_.cells, span_u.first, span_v.first, block);
+  set_nodes(scene_.cells, first_u, first_v, block);
   return true;
 }
 

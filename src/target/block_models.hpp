@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "target/block_group.hpp"
 #include "target/fit_scene.hpp"
 #include "target/marker_map.hpp"
 #include "target/node_block.hpp"
@@ -31,18 +32,19 @@ class BlockModels {
     int left, right, top, bottom;
   };
   Range range() const;
-  bool outside(const Quadratic& u, const Quadratic& v) const;
+  /// Fills a group that has its columns and rows.
+  void fill(BlockGroup& group) const { fill_group(scene_.lens, source_, group); }
 
   double contrast(double x, double y) const;
   double x_of(double px) const { return (px - state_.middle[0]) * per_side_; }
   double y_of(double px) const { return (px - state_.middle[1]) * per_side_; }
 
   /// In full, for every block.
-  BlockModel model(int column, int row, const Quadratic& u, const Quadratic& v, const AxesBlur& blur) const;
+  BlockModel model(const BlockGroup& group, std::size_t lane, const AxesBlur& blur) const;
   /// By the nearest nodes alone: what is the same for all blocks of a place, then a block of it. False where nodes are
   /// not enough.
-  bool set_place(const AxesBlur& blur, NodeBlock& block);
-  bool set_block(int column, int row, const Quadratic& u, const Quadratic& v, NodeBlock& block) const;
+  bool set_place(const AxesBlur& blur, NodePlace& place);
+  bool set_block(const BlockGroup& group, std::size_t lane, NodeBlock& block) const;
 
  private:
   struct Limits {
@@ -55,6 +57,7 @@ class BlockModels {
   const FitState& state_;
   const MarkerMap& map_;
   double first_, per_side_;
+  GroupSource source_;
   Limits limits_u_ = {}, limits_v_ = {};
 };
 

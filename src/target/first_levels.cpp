@@ -1,6 +1,5 @@
 #include "target/first_levels.hpp"
 
-#include "target/marker_map.hpp"
 #include "target/symmetric.hpp"
 
 namespace berth {
@@ -37,9 +36,7 @@ class Plane {
 
 }  // namespace
 
-bool first_levels(const FitScene& scene, FitState& state) {
-  MarkerMap map;
-  if (!map.set(scene.lens, state.corners, scene.border, 1)) return false;
+bool first_levels(const FitScene& scene, const MarkerMap& map, FitState& state) {
   Plane planes[2];
   int saturated[2] = {0, 0};
   for (int row = scene.cells.first(); row <= scene.cells.last(); ++row) {

@@ -12,7 +12,7 @@ constexpr double kLeastShare = 1e-10;
 
 void FitNormal::add_prior(const FitVector& factors, double value, double weight) {
   for (std::size_t i = 0; i < kUnknowns; ++i) {
-    equations_.gradient[i] -= weight * value * factors[i];
+    equations_.rows[i][FitEquations::kGradient] -= weight * value * factors[i];
     for (std::size_t j = i; j < kUnknowns; ++j) equations_.rows[i][j] += weight * factors[i] * factors[j];
   }
 }
@@ -28,7 +28,7 @@ FitMatrix FitNormal::lower() const {
 bool FitNormal::solve_levels(FitVector& step) const {
   FitMatrix factor = lower();
   if (!factorise<kUnknowns>(factor, kLeastShare, kToneCurve)) return false;
-  step = berth::solve<kUnknowns>(factor, equations_.gradient, kToneCurve);
+  step = berth::solve<kUnknowns>(factor, equations_.gradient(), kToneCurve);
   for (std::size_t i = kToneCurve; i < kUnknowns; ++i) step[i] = 0;
   return true;
 }
@@ -39,7 +39,7 @@ bool FitNormal::solve(FitVector& step, FitMatrix& factor) const {
     for (std::size_t i = 0; i < kToneCurve; ++i) factor[i * kUnknowns + i] = 1;  // held
   }
   if (!factorise<kUnknowns>(factor, kLeastShare)) return false;
-  step = berth::solve<kUnknowns>(factor, equations_.gradient);
+  step = berth::solve<kUnknowns>(factor, equations_.gradient());
   return true;
 }
 

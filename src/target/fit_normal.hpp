@@ -36,13 +36,18 @@ struct FitPlace {
 enum class Tones { smooth, local };
 
 /// Sums of the normal equations: products of the unknowns' derivatives, of which the upper triangle counts, in rows
-/// that are padded to whole vectors; those with the residuals; the residuals' squares.
+/// that are padded to whole vectors, and behind them those with the residuals; the residuals' squares.
 struct FitEquations {
-  static constexpr std::size_t kWidth = 24;
+  static constexpr std::size_t kWidth = 24, kGradient = kUnknowns;
   using Row = std::array<double, kWidth>;
-  alignas(32) std::array<Row, kUnknowns> rows = {};
-  FitVector gradient = {};
+  alignas(64) std::array<Row, kUnknowns> rows = {};
   double squares = 0;
+
+  FitVector gradient() const {
+    FitVector column;
+    for (std::size_t i = 0; i < kUnknowns; ++i) column[i] = rows[i][kGradient];
+    return column;
+  }
 };
 
 /// Normal equations of the fit, from integer sums that are added in a fixed order.

@@ -15,8 +15,9 @@ class FitPass {
   /// Which pixels a pass takes: a quarter of them, all over the marker, for a step that need not be exact.
   enum class Share { all, quarter };
 
-  /// Returns false where too few pixels count, the map has no end or the blur is too wide for the modules.
-  bool run(const FitScene& scene, const FitState& state, Share share);
+  /// `map`: by the state's corners. Returns false where too few pixels count, the map bends too much or the blur is too
+  /// wide for the modules.
+  bool run(const FitScene& scene, const MarkerMap& map, const FitState& state, Share share);
   /// Of residuals that are neighbours in a row and away from all edges: 0 where they are noise or too few, near 1 where
   /// the levels are wrong.
   double correlation() const;
@@ -25,10 +26,10 @@ class FitPass {
   double excess(double side_px) const;
 
   FitNormal normal;
-  MarkerMap map;
   int pixels = 0;
 
  private:
+  class Places;
   void count(const PixelCounts& counts);
 
   Tones tones_;

@@ -1,7 +1,7 @@
 // A place's sums into the equations. Rows are whole vectors, every element by the same products and sums in the same
 // order, so that instruction sets differ in how many they do at once alone.
 #include <algorithm>
-#include <type_traits>
+#include <initializer_list>
 
 #include "target/fit_normal.hpp"
 
@@ -15,6 +15,8 @@ HWY_BEFORE_NAMESPACE();
 namespace berth::HWY_NAMESPACE {
 namespace {
 
+namespace hn = hwy::HWY_NAMESPACE;
+
 // A place has levels of its own to tell where its pattern varies by this much (variance of P), and its contrast is not
 // taken as less than this, grey levels.
 constexpr double kLeastVariance = 0.02;
@@ -25,12 +27,33 @@ constexpr std::array<double, kChannels> kUnit = {1, kQ11, kQ11, kQ11, kQ11, kQ11
 
 using Sums = std::array<std::array<double, kChannels>, kChannels>;
 
-Sums scaled(const PlaceSums& integers) {
-  Sums sums;
-  std::size_t k = 0;
+// The upper triangle, row by row, padded to whole vectors; the sum of channels c <= d is at place_in(c) + d.
+using Triangle = std::array<double, 48>;
+constexpr std::size_t place_in(std::size_t c) { return c * kChannels - c * (c + 1) / 2; }
+
+constexpr Triangle units() {
+  Triangle result{};
   for (std::size_t c = 0; c < kChannels; ++c) {
-    for (std::size_t d = c; d < kChannels; ++d, ++k)
-      sums[c][d] = sums[d][c] = integers.total(k) * (kUnit[c] * kUnit[d]);
+    for (std::size_t d = c; d < kChannels; ++d) result[place_in(c) + d] = kUnit[c] * kUnit[d];
+  }
+  return result;
+}
+
+HWY_INLINE void scale(const PlaceSums& integers, Triangle& sums) {
+  alignas(64) static constexpr Triangle kUnits = units();
+  const hn::CappedTag<double, 8> d;
+  const hn::Rebind<std::int32_t, decltype(d)> ints;
+  static_assert(PlaceSums::kRows >= kUnits.size(), "what is loaded exists");
+  for (std::size_t k = 0; k < kUnits.size(); k += hn::Lanes(d)) {
+    const auto totals = hn::PromoteTo(d, hn::LoadU(ints, integers.rows.data() + k));
+    hn::Store(hn::Mul(totals, hn::Load(d, kUnits.data() + k)), d, sums.data() + k);
+  }
+}
+
+Sums whole(const Triangle& triangle) {
+  Sums sums;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    for (std::size_t d = c; d < kChannels; ++d) sums[c][d] = sums[d][c] = triangle[place_in(c) + d];
   }
   return sums;
 }
@@ -43,114 +66,118 @@ void eliminate(std::size_t c, std::size_t first, Sums& sums) {
   }
 }
 
-// A run of unknowns that a place's channels depend on by these factors.
-template <std::size_t kFirst, std::size_t kCount>
-struct Factors {
-  static constexpr std::size_t first = kFirst, count = kCount;
-  std::array<double, kCount> at;
-};
-
-// Derivatives of the model by the unknowns, channel by channel.
-struct Derivatives {
-  explicit Derivatives(const FitPlace& p)
-      : dark{{1, p.x, p.y}},
-        contrast{{1, p.x, p.y, p.x * p.x, p.x * p.y, p.y * p.y}},
-        tone{{p.contrast}},
-        // A pattern that moves by d shows at a place what was d before it: minus the slope.
-        slope_u{{u(p), u(p) * p.a, u(p) * p.b, 0, 0, 0, u(p) * p.a * p.a, u(p) * p.a * p.b}},
-        slope_v{{0, 0, 0, v(p), v(p) * p.a, v(p) * p.b, v(p) * p.a * p.b, v(p) * p.b * p.b}} {
-    for (std::size_t k = 0; k < 3; ++k) {
-      spread_u.at[k] = -p.contrast * p.wider_u[k];
-      spread_v.at[k] = -p.contrast * p.wider_v[k];
-      twist.at[k] = p.contrast * p.twist[k];
-    }
-  }
-  static double u(const FitPlace& p) { return -p.contrast * p.steep_u; }
-  static double v(const FitPlace& p) { return -p.contrast * p.steep_v; }
-
-  Factors<kDark, 3> dark;
-  Factors<kContrast, 6> contrast;
-  Factors<kToneCurve, 1> tone;
-  Factors<kField, 8> slope_u, slope_v;
-  Factors<kBlur, 3> spread_u, spread_v, twist;
-};
-
 constexpr std::size_t kWidth = FitEquations::kWidth;
 using Row = FitEquations::Row;
 
-template <class Run>
-HWY_INLINE void add_part(double sum, const Run& run, Row& row) {
-  for (std::size_t k = 0; k < Run::count; ++k) row[Run::first + k] += sum * run.at[k];
-}
-
-// A channel's sums with every unknown from that run on which it is for, `levels` saying whether dark and contrast are
-// among the unknowns.
-HWY_INLINE Row sums_with(const std::array<double, kChannels>& sums, const Derivatives& by, bool levels) {
-  Row row{};
-  if (levels) {
-    add_part(sums[kOne], by.dark, row);
-    add_part(sums[kLevel], by.contrast, row);
+// Derivatives of the model by the unknowns, a row for each channel; the residual stands for itself behind them.
+struct Derivatives {
+  explicit Derivatives(const FitPlace& p) {
+    const double x = p.x, y = p.y, a = p.a, b = p.b;
+    // A pattern that moves by d shows at a place what was d before it: minus the slope.
+    const double u = -p.contrast * p.steep_u, v = -p.contrast * p.steep_v;
+    set(kOne, kDark, {1, x, y});
+    set(kLevel, kContrast, {1, x, y, x * x, x * y, y * y});
+    set(kTone, kToneCurve, {p.contrast});
+    set(kSlopeU, kField, {u, u * a, u * b, 0, 0, 0, u * a * a, u * a * b});
+    set(kSlopeV, kField, {0, 0, 0, v, v * a, v * b, v * a * b, v * b * b});
+    const auto blur = [&](Channel channel, double times, const std::array<double, 3>& one) {
+      set(channel, kBlur, {times * one[0], times * one[1], times * one[2]});
+    };
+    blur(kSpreadU, -p.contrast, p.wider_u);
+    blur(kSpreadV, -p.contrast, p.wider_v);
+    blur(kTwist, p.contrast, p.twist);
+    set(kResidual, FitEquations::kGradient, {1});
   }
-  add_part(sums[kTone], by.tone, row);
-  add_part(sums[kSlopeU], by.slope_u, row);
-  add_part(sums[kSlopeV], by.slope_v, row);
-  add_part(sums[kSpreadU], by.spread_u, row);
-  add_part(sums[kSpreadV], by.spread_v, row);
-  add_part(sums[kTwist], by.twist, row);
-  return row;
+
+  alignas(64) std::array<Row, kChannels> by = {};
+
+ private:
+  void set(Channel channel, std::size_t first, std::initializer_list<double> values) {
+    std::copy(values.begin(), values.end(), by[channel].begin() + static_cast<std::ptrdiff_t>(first));
+  }
+};
+
+using D = hn::CappedTag<double, 8>;
+using V = hn::Vec<D>;
+constexpr std::size_t kLanes = hn::MaxLanes(D());
+
+// The first and the last channel that depend on each eight of the unknowns.
+constexpr std::size_t kEight = 8;
+constexpr std::size_t kFirstOf[kWidth / kEight] = {kOne, kLevel, kSlopeU};
+constexpr std::size_t kLastOf[kWidth / kEight] = {kLevel, kSlopeV, kResidual};
+
+// Sums of two channels.
+struct ByTriangle {
+  const Triangle& sums;
+  double operator()(std::size_t c, std::size_t d) const { return sums[c < d ? place_in(c) + d : place_in(d) + c]; }
+};
+struct ByRows {
+  const Sums& sums;
+  double operator()(std::size_t c, std::size_t d) const { return sums[c][d]; }
+};
+
+// Adds a channel to the rows of its unknowns, columns from kFrom on: whole vectors, of which what is left of the
+// diagonal does not count. Nor do channels before kFirst, which depend on unknowns left of it alone.
+template <std::size_t kFrom, std::size_t kFirst, class SumOf>
+HWY_INLINE void add_channel(std::size_t channel, std::initializer_list<std::size_t> unknowns, SumOf sum_of,
+                            const Derivatives& derivatives, FitEquations& equations) {
+  const D d;
+  V with[(kWidth - kFrom) / kLanes];
+  for (std::size_t i = 0; i < (kWidth - kFrom) / kLanes; ++i) {
+    const std::size_t eight = (kFrom + i * kLanes) / kEight;
+    with[i] = hn::Zero(d);
+    for (std::size_t c = std::max(kFirst, kFirstOf[eight]); c <= kLastOf[eight]; ++c) {
+      const V by = hn::Load(d, derivatives.by[c].data() + kFrom + i * kLanes);
+      with[i] = hn::Add(with[i], hn::Mul(hn::Set(d, sum_of(channel, c)), by));
+    }
+  }
+  for (const std::size_t k : unknowns) {
+    const V factor = hn::Set(d, derivatives.by[channel][k]);
+    double* const row = equations.rows[k].data() + kFrom;
+    for (std::size_t i = 0; i < (kWidth - kFrom) / kLanes; ++i) {
+      hn::Store(hn::Add(hn::Load(d, row + i * kLanes), hn::Mul(factor, with[i])), d, row + i * kLanes);
+    }
+  }
 }
 
-// Adds a channel to the rows of its unknowns, from column kFrom on: whole vectors, of which what is left of the
-// diagonal does not count.
-template <std::size_t kFrom, class Run>
-HWY_INLINE void add_channel(const Run& run, const Row& with, double residual, FitEquations& equations) {
-  for (std::size_t k = 0; k < Run::count; ++k) {
-    const double factor = run.at[k];
-    Row& row = equations.rows[Run::first + k];
-    for (std::size_t j = kFrom; j < kWidth; ++j) row[j] += factor * with[j];
-    equations.gradient[Run::first + k] += factor * residual;
+template <class SumOf>
+HWY_INLINE void add_edges(SumOf sum_of, const Derivatives& by, FitEquations& equations) {
+  add_channel<8, kTone>(kTone, {kToneCurve}, sum_of, by, equations);
+  constexpr std::size_t f = kField;
+  add_channel<8, kSlopeU>(kSlopeU, {f, f + 1, f + 2, f + 6, f + 7}, sum_of, by, equations);
+  add_channel<8, kSlopeU>(kSlopeV, {f + 3, f + 4, f + 5, f + 6, f + 7}, sum_of, by, equations);
+  for (const std::size_t channel : {kSpreadU, kSpreadV, kTwist}) {
+    add_channel<16, kSpreadU>(channel, {kBlur, kBlur + 1, kBlur + 2}, sum_of, by, equations);
   }
 }
 
 }  // namespace
 
 void add_place(const FitPlace& where, const PlaceSums& integers, Tones tones, FitEquations& equations) {
-  const bool has_edges = integers.total(PlaceSums::kOnEdges) > 0;
-  Sums sums = scaled(integers);
-  FitPlace place = where;
+  const bool has_edges = integers.rows[PlaceSums::kOnEdges] > 0;
+  alignas(64) Triangle sums;
+  scale(integers, sums);
   if (tones == Tones::local) {
-    eliminate(kOne, kLevel, sums);
-    const double variance = sums[kLevel][kLevel];
-    const bool tells = has_edges && variance >= kLeastVariance * sums[kOne][kOne];
+    Sums left = whole(sums);
+    eliminate(kOne, kLevel, left);
+    const double variance = left[kLevel][kLevel];
+    const bool tells = has_edges && variance >= kLeastVariance * left[kOne][kOne];
+    FitPlace place = where;
     if (tells) {
-      place.contrast = std::max(kLeastContrast, place.contrast + sums[kLevel][kResidual] / variance);
-      eliminate(kLevel, kTone, sums);
+      place.contrast = std::max(kLeastContrast, place.contrast + left[kLevel][kResidual] / variance);
+      eliminate(kLevel, kTone, left);
     }
-    equations.squares += sums[kResidual][kResidual];
-    if (!tells) return;
-  } else {
-    equations.squares += sums[kResidual][kResidual];
+    equations.squares += left[kResidual][kResidual];
+    // Elimination rounds the two halves apart: the rows it wrote count.
+    if (tells) add_edges(ByRows{left}, Derivatives(place), equations);
+    return;
   }
-  const Derivatives by(place);
-  const bool levels = tones == Tones::smooth;
-  const auto add_to = [&](auto from, Channel channel, const auto& run) {
-    const Row with = sums_with(sums[channel], by, levels);
-    add_channel<decltype(from)::value>(run, with, sums[channel][kResidual], equations);
-  };
-  using FromStart = std::integral_constant<std::size_t, 0>;
-  using FromTone = std::integral_constant<std::size_t, 8>;
-  using FromBlur = std::integral_constant<std::size_t, 16>;
-  if (levels) {
-    add_to(FromStart(), kOne, by.dark);
-    add_to(FromStart(), kLevel, by.contrast);
-  }
-  if (!has_edges) return;
-  add_to(FromTone(), kTone, by.tone);
-  add_to(FromTone(), kSlopeU, by.slope_u);
-  add_to(FromTone(), kSlopeV, by.slope_v);
-  add_to(FromBlur(), kSpreadU, by.spread_u);
-  add_to(FromBlur(), kSpreadV, by.spread_v);
-  add_to(FromBlur(), kTwist, by.twist);
+  const ByTriangle sum_of{sums};
+  equations.squares += sum_of(kResidual, kResidual);
+  const Derivatives by(where);
+  add_channel<0, kOne>(kOne, {0, 1, 2}, sum_of, by, equations);
+  add_channel<0, kLevel>(kLevel, {3, 4, 5, 6, 7, 8}, sum_of, by, equations);
+  if (has_edges) add_edges(sum_of, by, equations);
 }
 
 }  // namespace berth::HWY_NAMESPACE
@@ -161,7 +188,7 @@ namespace berth {
 HWY_EXPORT(add_place);
 void FitNormal::add(const FitPlace& place, const PlaceSums& sums) {
   constexpr std::size_t kOneByOne = 0;  // pixels of this place, of which a block's quarter may have none
-  if (sums.total(kOneByOne) > 0) HWY_DYNAMIC_DISPATCH(add_place)(place, sums, tones_, equations_);
+  if (sums.rows[kOneByOne] > 0) HWY_DYNAMIC_DISPATCH(add_place)(place, sums, tones_, equations_);
 }
 }  // namespace berth
 #endif

@@ -24,8 +24,6 @@ std::array<float, 6> stored(const Quadratic& q) {
   return {f(q.c), f(q.x), f(q.y), f(q.xx), f(q.xy), f(q.yy)};
 }
 
-Quadratic loaded(const std::array<float, 6>& q) { return {q[0], q[1], q[2], q[3], q[4], q[5]}; }
-
 }  // namespace
 
 LensBlocks::LensBlocks(const std::optional<CameraModel>& camera, int width, int height)
@@ -58,16 +56,23 @@ LensBlocks::LensBlocks(const std::optional<CameraModel>& camera, int width, int 
   }
 }
 
-void LensBlocks::rays(int column, int row, Quadratic& x, Quadratic& y) const {
+void LensBlocks::rays(int column, int row, std::size_t lane, Rays& to) const {
+  constexpr int kMiddle = kSide / 2;
+  to.px[lane] = kSide * column + kMiddle;
+  to.py[lane] = kSide * row + kMiddle;
   if (!camera_) {
-    x = {kSide * column + 4.0, 1, 0, 0, 0, 0};
-    y = {kSide * row + 4.0, 0, 1, 0, 0, 0};
+    for (std::size_t k = 0; k < 6; ++k) to.x[k][lane] = to.y[k][lane] = 0;
+    to.x[0][lane] = to.px[lane];
+    to.y[0][lane] = to.py[lane];
+    to.x[1][lane] = to.y[2][lane] = 1;
     return;
   }
   const Block& block =
       blocks_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
-  x = loaded(block.x);
-  y = loaded(block.y);
+  for (std::size_t k = 0; k < 6; ++k) {
+    to.x[k][lane] = block.x[k];
+    to.y[k][lane] = block.y[k];
+  }
 }
 
 std::array<double, 2> LensBlocks::ray(const Point& point_px) const {

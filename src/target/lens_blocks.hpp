@@ -23,8 +23,16 @@ class LensBlocks {
 
   LensBlocks(const std::optional<CameraModel>& camera, int width, int height);
 
-  /// The plane's coordinates about the block's middle, pixel (8 column + 4, 8 row + 4).
-  void rays(int column, int row, Quadratic& x, Quadratic& y) const;
+  /// Four blocks, a lane each: the plane's coordinates about the blocks' middles, coefficients as in Quadratic; those
+  /// middles, px.
+  struct Rays {
+    using Lanes = std::array<double, 4>;
+    using Coordinate = std::array<Lanes, 6>;
+    alignas(32) Coordinate x, y;
+    alignas(32) Lanes px, py;
+  };
+  /// Puts a block into a lane. Its middle is pixel (8 column + 4, 8 row + 4).
+  void rays(int column, int row, std::size_t lane, Rays& to) const;
   /// The plane's point of an image point (px).
   std::array<double, 2> ray(const std::array<double, 2>& point_px) const;
   /// The image point (px) of the plane's, and its derivative: du/dx, du/dy, dv/dx, dv/dy.

@@ -15,30 +15,6 @@ bool MarkerMap::set(const LensBlocks& lens, const Corners& corners, double borde
   return true;
 }
 
-void MarkerMap::block(int column, int row, Quadratic& u, Quadratic& v) const {
-  Quadratic x, y;
-  lens_->rays(column, row, x, y);
-  const auto linear = [&](const std::array<double, 3>& h) -> Quadratic {
-    return {h[0] * x.c + h[1] * y.c + h[2], h[0] * x.x + h[1] * y.x,   h[0] * x.y + h[1] * y.y,
-            h[0] * x.xx + h[1] * y.xx,      h[0] * x.xy + h[1] * y.xy, h[0] * x.yy + h[1] * y.yy};
-  };
-  const Quadratic depth = linear(back_[2]);
-  const double scale = 1 / depth.c;
-  // A quotient's series, order by order: the product with the depth has the numerator's.
-  const auto quotient = [&](const Quadratic& n) {
-    Quadratic q;
-    q.c = n.c * scale;
-    q.x = (n.x - q.c * depth.x) * scale;
-    q.y = (n.y - q.c * depth.y) * scale;
-    q.xx = (n.xx - q.c * depth.xx - q.x * depth.x) * scale;
-    q.xy = (n.xy - q.c * depth.xy - q.x * depth.y - q.y * depth.x) * scale;
-    q.yy = (n.yy - q.c * depth.yy - q.y * depth.y) * scale;
-    return q;
-  };
-  u = quotient(linear(back_[0]));
-  v = quotient(linear(back_[1]));
-}
-
 std::array<double, 2> MarkerMap::at(double u, double v, std::array<double, 4>& derivative) const {
   const QuadMap& m = rays_;
   const double scale = 1 / (m.gz * u + m.hz * v + 1);

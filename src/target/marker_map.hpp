@@ -15,15 +15,14 @@ class MarkerMap {
   /// from in front, and the map stays finite up to `reach` modules outside.
   bool set(const LensBlocks& lens, const Corners& corners, double border, double reach);
 
-  /// (u, v) in a block of LensBlocks, to the second order about its middle.
-  void block(int column, int row, Quadratic& u, Quadratic& v) const;
+  /// From the lens' plane: rows of u z, v z and z.
+  const std::array<std::array<double, 3>, 3>& back() const { return back_; }
   /// Image point of (u, v), and its derivative: dx/du, dx/dv, dy/du, dy/dv.
   std::array<double, 2> at(double u, double v, std::array<double, 4>& derivative) const;
 
  private:
   const LensBlocks* lens_ = nullptr;
   QuadMap rays_;  // from (u, v) to the lens' plane
-  // From the lens' plane: rows of u z, v z and z.
   std::array<std::array<double, 3>, 3> back_ = {};
 };
 

@@ -39,10 +39,11 @@ struct Seen {
   bool counts = false, is_saturated = false, on_edge = false;
 };
 
-Seen look(const NodeBlock& m, const EdgePieces& pieces, int grey, int dx, int dy) {
+Seen look(const NodePlace& place, const NodeBlock& m, const EdgePieces& pieces, int grey, int dx, int dy) {
   Seen seen;
-  const auto at = [&](const std::array<std::int32_t, 6>& q) {
-    return q[0] + q[1] * dx + q[2] * dy + q[3] * (dx * dx) + q[4] * (dx * dy) + q[5] * (dy * dy);
+  const auto at = [&](const NodeCoordinate& q) {
+    const auto& s = q.slopes;
+    return q.start + s[0] * dx + s[1] * dy + s[2] * (dx * dx) + s[3] * (dx * dy) + s[4] * (dy * dy);
   };
   const int at_u = at(m.u), at_v = at(m.v);
   if (at_u < m.u_first || at_u >= m.u_last || at_v < m.v_first || at_v >= m.v_last) return seen;
@@ -51,8 +52,8 @@ Seen look(const NodeBlock& m, const EdgePieces& pieces, int grey, int dx, int dy
   seen.is_saturated = grey == 0 || grey == 255;
   if (seen.is_saturated) return seen;
 
-  const Edge u(pieces, (at_u & 65535) - 32768, m.gain_u, m.doublings_u);
-  const Edge v(pieces, (at_v & 65535) - 32768, m.gain_v, m.doublings_v);
+  const Edge u(pieces, (at_u & 65535) - 32768, place.gain_u, place.doublings_u);
+  const Edge v(pieces, (at_v & 65535) - 32768, place.gain_v, place.doublings_v);
   // q13: what is between the edges changes along u by `along_u` for each unit of the edge's level, likewise along v.
   const int both = m.nodes.both[node] * 256;
   const int along_u = m.nodes.by_u[node] * 256 + product(both, v.level);
@@ -61,15 +62,15 @@ Seen look(const NodeBlock& m, const EdgePieces& pieces, int grey, int dx, int dy
   // A correlated normal distribution of two variables, to the second power of the correlation.
   const int first = product(both, product(u.slope, v.slope));
   const int second = product(both, product(u.spread, v.spread) * 16);
-  const int level = plain + product(m.correlation, first) + product(m.half_square, second);
+  const int level = plain + product(place.correlation, first) + product(place.half_square, second);
   const int tone = product(2 * level, 16384 - 2 * level);
-  const int shown = level + product(m.tone, tone);
-  const int steep = 8192 + product(m.tone, 8192 - 2 * level);
+  const int shown = level + product(place.tone, tone);
+  const int steep = 8192 + product(place.tone, 8192 - 2 * level);
   const int dark = (m.dark >> 5) + (((m.dark & 31) + 16 + m.dark_step[0] * dx + m.dark_step[1] * dy) >> 5);
   const int contrast =
       (m.contrast >> 3) + (((m.contrast & 7) + 4 + m.contrast_step[0] * dx + m.contrast_step[1] * dy) >> 3);
   const int residual = grey * 16 - dark - product(contrast, shown);
-  if (residual > m.most_residual || residual < -m.most_residual) return seen;
+  if (residual > place.most_residual || residual < -place.most_residual) return seen;
 
   seen.counts = true;
   seen.values[kOne] = 1;
@@ -84,26 +85,27 @@ Seen look(const NodeBlock& m, const EdgePieces& pieces, int grey, int dx, int dy
   seen.values[kSlopeV] = slope_v;
   seen.values[kSpreadU] = product(product(along_u, u.spread) * 4, steep);
   seen.values[kSpreadV] = product(product(along_v, v.spread) * 4, steep);
-  seen.values[kTwist] = product(first + product(m.correlation, second), steep);
+  seen.values[kTwist] = product(first + product(place.correlation, second), steep);
   return seen;
 }
 
 }  // namespace
 
-void add_block(View2D<const u8> image, const EdgePieces& edge, const NodeBlock& block, PlaceSums& sums) {
+void add_block(View2D<const u8> image, const EdgePieces& edge, const NodePlace& place, const NodeBlock& block,
+               PlaceSums& sums) {
   PixelCounts counts;
-  for (int dy = -4; dy < 4; dy += block.row_step) {
+  for (int dy = -4; dy < 4; dy += place.row_step) {
     const u8* const row = image.row(block.y + dy);
     bool left_is_even = false;
     int left_residual = 0;
     for (int dx = -4; dx < 4; ++dx) {
-      const Seen seen = look(block, edge, row[block.x + dx], dx, dy);
+      const Seen seen = look(place, block, edge, row[block.x + dx], dx, dy);
       counts.saturated += seen.is_saturated ? 1 : 0;
       counts.pixels += seen.counts ? 1 : 0;
       counts.on_edges += seen.on_edge ? 1 : 0;
       std::size_t k = 0;
       for (std::size_t a = 0; a < kChannels; ++a) {
-        for (std::size_t b = a; b < kChannels; ++b, ++k) sums.lanes[k][0] += seen.values[a] * seen.values[b];
+        for (std::size_t b = a; b < kChannels; ++b, ++k) sums.rows[k] += seen.values[a] * seen.values[b];
       }
       const bool is_even = seen.counts && !seen.on_edge;
       const int residual = seen.values[kResidual];

@@ -190,23 +190,19 @@ void add_products(const BlockChannels& channels, int first, int count, PlaceSums
       const std::int16_t* const q = channels.values[b].data() + first;
       std::int32_t sum = 0;
       for (int i = 0; i < count; ++i) sum += static_cast<std::int32_t>(p[i]) * q[i];
-      sums.lanes[product][0] += sum;
+      sums.rows[product] += sum;
     }
   }
 }
 
-void PlaceSums::clear() {
-  for (auto& row : lanes) row.fill(0);
-}
-
 void PlaceSums::add(const PixelCounts& c) {
   const std::int32_t values[] = {c.pixels, c.on_edges, c.saturated, c.even, c.pairs, c.even_squares, c.pair_products};
-  for (std::size_t k = 0; k < kRows - kPixels; ++k) lanes[kPixels + k][0] += values[k];
+  for (std::size_t k = 0; k < kRows - kPixels; ++k) rows[kPixels + k] += values[k];
 }
 
 PixelCounts PlaceSums::counts() const {
-  return {total(kPixels), total(kOnEdges),     total(kSaturated),   total(kEven),
-          total(kPairs),  total(kEvenSquares), total(kPairProducts)};
+  return {rows[kPixels], rows[kOnEdges],     rows[kSaturated],   rows[kEven],
+          rows[kPairs],  rows[kEvenSquares], rows[kPairProducts]};
 }
 
 }  // namespace berth

@@ -57,11 +57,10 @@ struct PixelCounts {
   std::int32_t even_squares = 0, pair_products = 0;
 };
 
-/// Sums of a place (a quarter of a block, a block, or four) as they grow, a row each: products, then what PixelCounts
-/// holds, in its order. Totals over the lanes count, not which pixels a lane took. Every total is below 2^31 in size:
-/// 256 · 2355² are, levels being below 1.15 with the tone curve's part, everything else below 2^11.
+/// Sums of a place (a quarter of a block, a block, or four) as they grow: products, then what PixelCounts holds, in its
+/// order. Every one is below 2^31 in size: 256 · 2355² are, levels being below 1.15 with the tone curve's part,
+/// everything else below 2^11.
 struct PlaceSums {
-  static constexpr std::size_t kLanes = 8;
   enum Row : std::size_t {
     kPixels = kProducts,
     kOnEdges,
@@ -72,15 +71,11 @@ struct PlaceSums {
     kPairProducts,
     kRows
   };
-  alignas(32) std::array<std::array<std::int32_t, kLanes>, kRows> lanes;
+  static_assert(kRows % 4 == 0, "whole vectors");
+  alignas(16) std::array<std::int32_t, kRows> rows;
 
-  void clear();
+  void clear() { rows.fill(0); }
   void add(const PixelCounts& counts);
-  std::int32_t total(std::size_t row) const {
-    std::int32_t sum = 0;
-    for (const std::int32_t lane : lanes[row]) sum += lane;
-    return sum;
-  }
   PixelCounts counts() const;
 };
 

@@ -131,7 +131,8 @@ void add_priors(const FitState& state, double noise, FitNormal& normal) {
 // Solves a pass' normal equations and moves the state. Returns false where the step leads nowhere.
 class Step {
  public:
-  Step(const FitPass& pass, double border, FitState& state) : pass_(pass), border_(border), state_(state) {}
+  Step(const FitPass& pass, const MarkerMap& map, double border, FitState& state)
+      : pass_(pass), map_(map), border_(border), state_(state) {}
 
   bool take() {
     FitNormal normal = pass_.normal;
@@ -143,7 +144,7 @@ class Step {
     const double trace = state_.blur[0] + state_.blur[2];
     move_blur(step, state_.blur);
     blur_change_ = std::fabs(state_.blur[0] + state_.blur[2] - trace) / trace;
-    const FieldToCorners corners = corners_of_field(pass_.map, border_);
+    const FieldToCorners corners = corners_of_field(map_, border_);
     const Corners before = state_.corners;
     double variances = 0;
     std::array<std::array<double, kUnknowns - kField>, 8> white;
@@ -173,6 +174,7 @@ class Step {
 
  private:
   const FitPass& pass_;
+  const MarkerMap& map_;
   double border_;
   FitState& state_;
   double noise_ = 0, moved_px_ = 0, deviation_px_ = 0, blur_change_ = 0;
@@ -192,13 +194,16 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
   }
   const FitScene scene{image, lens_, profile_, cells_, static_cast<double>(family.border_width)};
 
+  MarkerMap map;
+  const auto set_map = [&] { return map.set(lens_, state.corners, scene.border, 1); };
+  if (!set_map()) return false;
   const bool small = state.side_px < kSmall_px;
   FitPass pass(Tones::smooth);
-  if (state.side_px < kSampled_px || !first_levels(scene, state)) {
+  if (state.side_px < kSampled_px || !first_levels(scene, map, state)) {
     // Levels alone from all pixels, and from mid-grey, so that no residual is beyond 128.
     state.dark[0] = 128;
     FitVector step;
-    if (!pass.run(scene, state, small ? FitPass::Share::all : FitPass::Share::quarter) ||
+    if (!pass.run(scene, map, state, small ? FitPass::Share::all : FitPass::Share::quarter) ||
         !pass.normal.solve_levels(step) || !move_levels(step, state)) {
       return false;
     }
@@ -212,8 +217,8 @@ bool PhotometricFit::refine(View2D<const u8> image, const MarkerFamily& family, 
     // The first step is long and need not be exact.
     const FitPass::Share share = k == 0 && !small ? FitPass::Share::quarter : FitPass::Share::all;
     pass = FitPass(tones);
-    if (!pass.run(scene, state, share)) return false;
-    Step next(pass, scene.border, state);
+    if ((k > 0 && !set_map()) || !pass.run(scene, map, state, share)) return false;
+    Step next(pass, map, scene.border, state);
     if (!next.take()) return false;
     if (farthest(state.corners, turned_round(corners)) * scene.border > kMostChange_modules * state.side_px)
       return false;
