@@ -15,6 +15,7 @@
 #include "sim/random.hpp"
 #include "support/noisy_corners.hpp"
 #include "target/planar_pose.hpp"
+#include "target/pose_steps.hpp"
 #include "target/refine_pose.hpp"
 
 namespace berth {
@@ -78,6 +79,83 @@ TEST(MarkerPose, IsThereForSmallMarkersThatFaceTheCamera) {
     ASSERT_TRUE(marker_pose(camera, kSide_m, 0.15, with_noise(seen_corners(camera, truth, kSide_m), 0.15, random),
                             found, uncertainty))
         << i;
+  }
+}
+
+// As of edges: the ends of a side along rows or columns turn it together, px².
+CornerCovariance edges_covariance() {
+  CornerCovariance covariance{};
+  const auto put = [&](std::size_t i, std::size_t j, double value) {
+    covariance[8 * i + j] = covariance[8 * j + i] = value;
+  };
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    put(2 * corner, 2 * corner, 4.2e-4);
+    put(2 * corner + 1, 2 * corner + 1, 3.5e-4);
+  }
+  put(0, 2, -3.1e-4);
+  put(4, 6, -3.1e-4);
+  put(1, 7, -2.6e-4);
+  put(3, 5, -2.6e-4);
+  return covariance;
+}
+
+// A frame of a marker that faces the camera: steps that know the residuals' slopes alone go to and fro there, and had
+// neither pose after 30 of them.
+TEST(MarkerPose, ComesToItsEndWhereBothPosesBecomeOne) {
+  const CameraModel camera = paper_camera();
+  const Corners4 corners = {{{283.9032, 212.5668}, {283.8879, 262.6649}, {333.7474, 262.6528}, {333.7230, 212.5607}}};
+  Pose pose;
+  PoseUncertainty uncertainty;
+  ASSERT_TRUE(marker_pose(camera, 1, corners, edges_covariance(), pose, uncertainty));
+  // At its end: no step nearby is better.
+  const SeenCorners seen = seen_corners_of(1, corners, edges_covariance());
+  const auto squares = [&](const Pose& at) {
+    PoseNormal normal;
+    EXPECT_TRUE(add_corners(camera, at, seen, normal));
+    return normal.squares;
+  };
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (const double size : {-1e-3, 1e-3}) {
+      std::array<double, 6> step{};
+      step[i] = size;
+      EXPECT_GT(squares(moved(pose, step)), uncertainty.chi_square) << i;
+    }
+  }
+}
+
+// Slopes and bend are half the sum of squares' first and second derivative.
+TEST(PoseSteps, KnowTheImagesBend) {
+  CameraModel camera = paper_camera();
+  camera.distortion = {};  // the lens is taken as linear
+  sim::Random random(6);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Pose truth = random_pose(random, 0.3, 1, 0.8);
+    const SeenCorners seen =
+        seen_corners_of(kSide_m, with_noise(seen_corners(camera, truth, kSide_m), 3, random), edges_covariance());
+    const auto at = [&](const std::array<double, 6>& step) {
+      PoseNormal normal;
+      EXPECT_TRUE(add_corners(camera, moved(truth, step), seen, normal));
+      return normal;
+    };
+    const PoseNormal here = at({});
+    for (std::size_t i = 0; i < 6; ++i) {
+      constexpr double kSize = 1e-5;
+      for (std::size_t j = 0; j <= i; ++j) {
+        const auto squares = [&](double by_i, double by_j) {
+          std::array<double, 6> step{};
+          step[i] += by_i * kSize;
+          step[j] += by_j * kSize;
+          return at(step).squares;
+        };
+        const double second =
+            (squares(1, 1) - squares(1, -1) - squares(-1, 1) + squares(-1, -1)) / (4 * kSize * kSize) / 2;
+        const double scale = std::sqrt(here.matrix[i * 7] * here.matrix[j * 7]);
+        EXPECT_NEAR(here.matrix[i * 6 + j] + here.bend[i * 6 + j], second, 1e-3 * scale) << trial << ' ' << i << j;
+      }
+    }
+    double bend = 0;
+    for (std::size_t i = 0; i < 6; ++i) bend = std::max(bend, std::fabs(here.bend[i * 7]) / here.matrix[i * 7]);
+    EXPECT_GT(bend, 0.01) << trial;
   }
 }
 

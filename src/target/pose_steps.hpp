@@ -15,6 +15,9 @@ namespace berth {
 struct PoseNormal {
   SquareMatrix<6> matrix = {};
   std::array<double, 6> gradient = {};  // minus half the sum of squares' derivative
+  /// What `matrix` lacks of half the sum of squares' second derivative, minus the residuals times the image's second
+  /// derivatives; 0 where that is not known. The lower triangle. A pose's information is `matrix` alone.
+  SquareMatrix<6> bend = {};
   double squares = 0;
   double squares_px = 0;
 
@@ -49,25 +52,35 @@ struct PoseNormal {
   }
 };
 
+/// Of steps to which the image's bend is not known.
+struct NoBend {
+  void operator()(std::size_t, const Vec3&, double) const {}
+};
+
 /// The rows of corners. `place_of(i)` is where corner i is in the camera frame, `row_of(i, by_point)` takes the
-/// derivative of an image coordinate by that point (px/m) to that by a step of the pose. Returns false where a point is
-/// not before the camera.
-template <class PlaceOf, class RowOf>
-bool add_seen(const CameraModel& camera, const SeenCorners& corners, PoseNormal& normal, PlaceOf place_of,
-              RowOf row_of) {
+/// derivative of an image coordinate by that point (px/m) to that by a step of the pose. `add_bend(i, pull, depth_m)`
+/// may add to the normal equations' bend: the residuals pull at that point, minus half the sum of squares' derivative
+/// by it. Returns false where a point is not before the camera.
+template <class PlaceOf, class RowOf, class AddBend = NoBend>
+bool add_seen(const CameraModel& camera, const SeenCorners& corners, PoseNormal& normal, PlaceOf place_of, RowOf row_of,
+              AddBend add_bend = {}) {
   constexpr double kNearest_m = 1e-6;
   std::array<std::array<double, 6>, 8> rows{};
   std::array<double, 8> off{};
+  std::array<std::array<Vec3, 2>, 4> by_point{};
+  std::array<double, 4> depth_m{};
   const std::size_t count = 2 * corners.count;
   for (std::size_t i = 0; i < corners.count; ++i) {
     const Vec3 at = place_of(i);
     if (!(at[2] > kNearest_m)) return false;
     const double x = at[0] / at[2], y = at[1] / at[2];
+    depth_m[i] = at[2];
     std::array<double, 4> lens{};
     const Vec2 image = camera.project(x, y, lens);
     for (std::size_t k = 0; k < 2; ++k) {
       const double dx = lens[2 * k] / at[2], dy = lens[2 * k + 1] / at[2];
-      rows[2 * i + k] = row_of(i, Vec3{dx, dy, -(dx * x + dy * y)});
+      by_point[i][k] = {dx, dy, -(dx * x + dy * y)};
+      rows[2 * i + k] = row_of(i, by_point[i][k]);
       off[2 * i + k] = corners.seen_px[i][k] - image[k];
       normal.squares_px += off[2 * i + k] * off[2 * i + k];
     }
@@ -83,6 +96,14 @@ bool add_seen(const CameraModel& camera, const SeenCorners& corners, PoseNormal&
     off[i] /= factor[i];
     normal.add_row(rows[i], off[i]);
   }
+  // And by its transpose: the covariance's inverse times the residuals.
+  for (std::size_t i = count; i-- > 0;) {
+    for (std::size_t j = i + 1; j < count; ++j) off[i] -= corners.factor[8 * j + i] * off[j];
+    off[i] /= corners.factor[8 * i + i];
+  }
+  for (std::size_t i = 0; i < corners.count; ++i) {
+    add_bend(i, add(scaled(by_point[i][0], off[2 * i]), scaled(by_point[i][1], off[2 * i + 1])), depth_m[i]);
+  }
   return true;
 }
 
@@ -92,6 +113,24 @@ inline std::array<double, 6> step_row(const Vec3& by_point, const Vec3& arm) {
   return {by_point[0], by_point[1], by_point[2], by_turn[0], by_turn[1], by_turn[2]};
 }
 
+/// What the residuals' pull at a point adds to the bend: perspective's, by which an image coordinate with derivative g
+/// has the second derivative -2 (g · d) d_z / depth along a displacement d, and the turn's, since a turn w displaces by
+/// w x arm + w x (w x arm) / 2. The lens is taken as linear there.
+inline void add_step_bend(const Vec3& pull, double depth_m, const Vec3& arm, SquareMatrix<6>& bend) {
+  const std::array<double, 6> along = step_row(pull, arm), deeper = step_row({0, 0, 1}, arm);
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      bend[i * 6 + j] += (along[i] * deeper[j] + deeper[i] * along[j]) / depth_m;
+    }
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double turn = (arm[i] * pull[j] + pull[i] * arm[j]) / 2 - (i == j ? dot(arm, pull) : 0);
+      bend[(i + 3) * 6 + j + 3] -= turn;
+    }
+  }
+}
+
 /// Corners of a target at `pose` in the camera frame: derivatives by translation, then rotation about the camera's
 /// axes.
 inline bool add_corners(const CameraModel& camera, const Pose& pose, const SeenCorners& corners, PoseNormal& normal) {
@@ -99,7 +138,8 @@ inline bool add_corners(const CameraModel& camera, const Pose& pose, const SeenC
   for (std::size_t i = 0; i < corners.count; ++i) arms[i] = product(pose.R, corners.points_m[i]);
   return add_seen(
       camera, corners, normal, [&](std::size_t i) { return add(arms[i], pose.t); },
-      [&](std::size_t i, const Vec3& by_point) { return step_row(by_point, arms[i]); });
+      [&](std::size_t i, const Vec3& by_point) { return step_row(by_point, arms[i]); },
+      [&](std::size_t i, const Vec3& pull, double depth_m) { add_step_bend(pull, depth_m, arms[i], normal.bend); });
 }
 
 /// One corner; false too where its covariance is none.
@@ -122,8 +162,7 @@ inline bool add_corner(const CameraModel& camera, const Pose& pose, const PoseCo
 template <class Linearise>
 bool least_squares_pose(const Pose& start, Linearise linearise, RefinedPose& result, double& squares_px) {
   // Steps end when one promises to lower the sum of squares (standard deviations) by less than the first share of it.
-  // Where a plane's two poses have become one, least squares are as flat as a fourth power and come nearer ever more
-  // slowly: what promises less than the second share there is within the noise.
+  // Where there is no bend to go by, or no minimum near, what promises less than the second share is within the noise.
   constexpr int kMostSteps = 30;
   constexpr double kLeastGain = 1e-9, kEnough = 1e-3;
   // Relative to the diagonal. Below the least it is as good as none, and would only take longer to rise again.
@@ -139,9 +178,17 @@ bool least_squares_pose(const Pose& start, Linearise linearise, RefinedPose& res
   double damping = kFirstDamping;
   double gain = 1;  // relative, that the last step promised
   for (int k = 0; k < kMostSteps && gain > kLeastGain; ++k) {
+    // With the bend where that leaves a minimum, as it does near the end. Without it, where a plane's two poses become
+    // one, steps go twice as far as they should, to and fro, and come nearer ever more slowly.
     SquareMatrix<6> damped = here.matrix;
     for (std::size_t i = 0; i < 6; ++i) damped[i * 6 + i] *= 1 + damping;
-    if (!factorise<6>(damped)) return false;
+    SquareMatrix<6> bent = damped;
+    for (std::size_t i = 0; i < 36; ++i) bent[i] += here.bend[i];
+    if (factorise<6>(bent)) {
+      damped = bent;
+    } else if (!factorise<6>(damped)) {
+      return false;
+    }
     const std::array<double, 6> step = solve<6>(damped, here.gradient);
     double promised = 0;
     for (std::size_t i = 0; i < 6; ++i) promised += step[i] * here.gradient[i];
