@@ -14,6 +14,7 @@
 
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
+#include "pose_algebra.hpp"
 #include "run_main.hpp"
 #include "sim/close_up.hpp"
 #include "sim/corpus.hpp"
@@ -56,6 +57,10 @@ class Row {
           scale_pose(marker.size_m, found);
           if (grade == 1 && !found.corner_fit) continue;  // the edges' again
           sums_[grade].add(found, marker);
+          if (!found.has_pose) continue;
+          const std::array<double, 6> off = step_between(marker.pose, found.pose);
+          position_mm_[grade].push_back(1e3 * std::hypot(off[0], off[1], off[2]));
+          turn_deg_[grade].push_back(std::hypot(off[3], off[4], off[5]) * 180 / std::acos(-1.0));
         }
       }
     }
@@ -70,7 +75,8 @@ class Row {
                  kGradeNames[grade], sum.markers(), sum.corner_rms_px(), sum.corners(), corners[0], corners[1],
                  sum.pose(), poses[0], poses[1]);
       for (std::size_t i = 0; i < 6; ++i) fmt::print("{}{:.2f}", i == 0 ? " " : ", ", sum.axis(i));
-      fmt::print(" | {:.1f} | {} |\n", 100 * sum.outside(), sum.ambiguous());
+      fmt::print(" | {:.1f} | {} | {:.4f} | {:.4f} |\n", 100 * sum.outside(), sum.ambiguous(),
+                 median(position_mm_[grade]), median(turn_deg_[grade]));
     }
     std::fflush(stdout);
   }
@@ -90,8 +96,15 @@ class Row {
     return true;
   }
 
+  static double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+  }
+
   Backend& backend_;
   std::string name_;
+  std::array<std::vector<double>, 2> position_mm_, turn_deg_;
   std::array<std::unique_ptr<Detector>, 2> detectors_;
   std::array<table::Consistency, 2> sums_;
   CameraModel last_;
@@ -116,7 +129,8 @@ int run(int argc, char** argv) {
   fmt::print(
       "| frames | corners by | markers | corner RMS px | corners, mean square | pose, mean square | x, y, z, rx, ry, "
       "rz "
-      "| beyond 95 %: % | ambiguous |\n|---|---|---|---|---|---|---|---|---|\n");
+      "| beyond 95 %: % | ambiguous | position, median mm | turn, median ° |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
   if (!options.corpora_alone) {
     const std::unique_ptr<Source> source = open_scenario(options.scenario);
     Row row(*backend, "approach");
