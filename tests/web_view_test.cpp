@@ -360,18 +360,20 @@ TEST(LiveViewDocument, HasCommandsThatRun) {
       const std::string& before = words[i - 1];
       if (word.rfind("sim:", 0) == 0) word = "sim:" + std::string(BERTH_SOURCE_DIR) + "/" + word.substr(4);
       if (before == "--minutes") word = "0.002";
-      if (before == "--report" || before == "--view-token") word = folder / word;
+      if (before == "--report" || before == "--view-token" || before == "--record" || before == "view")
+        word = folder / word;
       if (before == "--view" && word.rfind("--", 0) != 0) word = word.substr(0, word.find(':')) + ":0";
       arguments.push_back(word);
       const bool is_bare = word == "--view" && (i + 1 == words.size() || words[i + 1].rfind("--", 0) == 0);
       if (is_bare) arguments.emplace_back("127.0.0.1:0");
     }
-    arguments.insert(arguments.end(), {"--max-frames", "3"});
-    const test::CommandRun run = test::run_berth(arguments);
+    const bool is_view = words[1] == "view";
+    arguments.insert(arguments.end(), {is_view ? "--address" : "--max-frames", is_view ? "127.0.0.1:0" : "3"});
+    const test::CommandRun run = is_view ? test::run_berth_until_interrupted(arguments) : test::run_berth(arguments);
     EXPECT_EQ(run.exit_code, 0) << words.back() << ": " << run.err;
     ++runs;
   }
-  EXPECT_GE(runs, 4);
+  EXPECT_GE(runs, 6);
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // berth replay and berth recover: recordings of `berth run --record`.
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -30,28 +28,6 @@ constexpr const char* kRecoverExamples = R"(Examples:
   berth recover flight.mcap                    writes flight.recovered.mcap, unless nothing is missing
   berth recover flight.mcap -o saved.mcap)";
 
-/// The recorded files, while they are needed.
-class Folder {
- public:
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "berth-replay-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      throw Error(pattern + ": the folder for the recorded files cannot be made; set TMPDIR to one that is writable");
-    }
-    path_ = pattern;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
 struct ReplayOptions {
   std::string file;
   EngineOptions engine;
@@ -59,11 +35,11 @@ struct ReplayOptions {
 };
 
 int replay(const ReplayOptions& asked, Console& console) {
-  const Folder folder;
+  const RestoredFiles files;
   StreamOptions options;
   {
     const mcap::Reader recording(asked.file);
-    options = restore_run(recording, asked.file, folder.path());
+    options = restore_run(recording, asked.file, files.path());
     const auto& run = recording.find_metadata(kRunMetadata)->values;
     const auto value = [&](const char* key) { return run.count(key) == 0 ? std::string("?") : run.at(key); };
     console.out() << fmt::format("recorded by berth {} from {}, on {}\n", value("version"), value("source"),

@@ -19,6 +19,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code);
 void add_survey(CLI::App& app, Console& console, int& exit_code);
 void add_table(CLI::App& app, Console& console, int& exit_code);
 void add_verify(CLI::App& app, Console& console, int& exit_code);
+void add_view(CLI::App& app, Console& console, int& exit_code);
 void add_bench(CLI::App& app, Console& console, int& exit_code);
 void add_eval(CLI::App& app, Console& console, int& exit_code);
 void add_model(CLI::App& app, Console& console, int& exit_code);

@@ -1,5 +1,8 @@
 #include "recording_setup.hpp"
 
+#include <unistd.h>
+
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -71,6 +74,19 @@ RecordingSetup describe_run(const StreamOptions& options, const std::string& sou
   setup.settings[kOptions] = to_line(json);
   setup.settings["source"] = source_name;
   return setup;
+}
+
+RestoredFiles::RestoredFiles() {
+  std::string pattern = (fs::temp_directory_path() / "berth-recording-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) {
+    throw Error(pattern + ": the folder for the recorded files cannot be made; set TMPDIR to one that is writable");
+  }
+  path_ = pattern;
+}
+
+RestoredFiles::~RestoredFiles() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
 }
 
 StreamOptions restore_run(const mcap::Reader& recording, const std::string& path, const std::string& folder) {

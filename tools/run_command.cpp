@@ -23,6 +23,7 @@ constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/port.toml --target targets/port.yaml   discs and rings
   berth run --source v4l2:video0 --record flight.mcap     frames and results, for Foxglove, rosbag2 and replay
   berth replay flight.mcap --backend opencl      the recording again: the same bits
+  berth view flight.mcap                         looked through in a browser, frame by frame
   berth recover flight.mcap                      after a loss of power: all that is whole
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
@@ -66,6 +67,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_flight(app, console, exit_code);
   add_run(app, console, exit_code);
   add_replay(app, console, exit_code);
+  add_view(app, console, exit_code);
   add_recover(app, console, exit_code);
   add_verify(app, console, exit_code);
   add_bench(app, console, exit_code);

@@ -11,10 +11,12 @@
 
 namespace berth::cli {
 
-WebAddress parse_web_address(const std::string& text) {
+WebAddress parse_web_address(const std::string& text, const char* option) {
   WebAddress address;
+  address.option = option;
   const auto complain = [&] {
-    return Error("--view " + text + ": give ADDRESS:PORT, e.g. 127.0.0.1:8040, or 0.0.0.0:8040 for every network");
+    return Error(std::string(option) + " " + text +
+                 ": give ADDRESS:PORT, e.g. 127.0.0.1:8040, or 0.0.0.0:8040 for every network");
   };
   if (text.empty()) return address;
   std::string host = text, port;

@@ -1,6 +1,9 @@
 #include "web_messages.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <random>
 
 namespace berth::cli {
 namespace {
@@ -14,6 +17,11 @@ Json rounded(double value, double scale) {
 constexpr double kMicro = 1e6, kTenThousandth = 1e4;
 
 }  // namespace
+
+std::string new_run_name() {
+  std::random_device device;
+  return fmt::format("{:08x}{:08x}", device(), device());
+}
 
 Json to_json(const WebAbout& about) {
   Json json = {{"run", about.run},

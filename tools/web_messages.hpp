@@ -25,6 +25,9 @@ struct WebAbout {
   bool can_control = false;
 };
 
+/// For WebAbout::run.
+std::string new_run_name();
+
 /// Once, to each viewer.
 Json to_json(const WebAbout& about);
 /// `now_s`: by the page's clock, in which the status tells its times too. `ended`: no frame comes any more.

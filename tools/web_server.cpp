@@ -1,20 +1,13 @@
-// The only file that knows the HTTP library.
+// With web_listener.hpp, all that knows the HTTP library.
 #include "web_server.hpp"
 
 #include <fmt/format.h>
-#include <httplib.h>
-#include <sys/resource.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <deque>
-#include <thread>
 
 #include "berth/error.hpp"
-#include "pipeline/thread_setup.hpp"
 #include "web_assets.hpp"
-#include "web_connection.hpp"
+#include "web_listener.hpp"
 
 namespace berth::cli {
 namespace {
@@ -31,109 +24,6 @@ constexpr double kTimesEveryS = 1;
 /// What whoever tries tokens waits for each.
 constexpr milliseconds kWrongTokenWait(300);
 constexpr const char* kBoundary = "berthpicture";
-
-/// Set on the thread that accepts while it turns a connection away.
-thread_local bool is_refusing = false;
-
-void become_a_servant() {
-  name_thread("berth-view");
-  make_ordinary();
-  // The stream goes first. Where that is not allowed, the thread is like any other.
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
-}
-
-/// Threads made when they are first needed. What comes while all of them are busy is turned away at once.
-class Workers final : public httplib::TaskQueue {
- public:
-  explicit Workers(std::atomic<u64>& refused) : refused_(refused) {}
-
-  void enqueue(std::function<void()> job) override {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (under_way_ < WebServer::kMostConnections) {
-        ++under_way_;
-        jobs_.push_back(std::move(job));
-        if (jobs_.size() > static_cast<std::size_t>(idle_)) threads_.emplace_back([this] { work(); });
-        more_.notify_one();
-        return;
-      }
-    }
-    ++refused_;
-    is_refusing = true;
-    job();
-    is_refusing = false;
-  }
-
-  void shutdown() override {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      is_over_ = true;
-    }
-    more_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
-
- private:
-  void work() {
-    become_a_servant();
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (true) {
-      ++idle_;
-      more_.wait(lock, [this] { return is_over_ || !jobs_.empty(); });
-      --idle_;
-      if (jobs_.empty()) return;
-      const std::function<void()> job = std::move(jobs_.front());
-      jobs_.pop_front();
-      lock.unlock();
-      job();
-      lock.lock();
-      --under_way_;
-    }
-  }
-
-  std::atomic<u64>& refused_;
-  std::mutex mutex_;
-  std::condition_variable more_;
-  std::deque<std::function<void()>> jobs_;
-  std::vector<std::thread> threads_;
-  int idle_ = 0, under_way_ = 0;
-  bool is_over_ = false;
-};
-
-/// A connection as the HTTP library wants it.
-class Connection final : public httplib::Stream {
- public:
-  explicit Connection(WebConnection& connection) : connection_(connection) {}
-  bool is_readable() const override { return connection_.is_readable(); }
-  bool is_writable() const override { return connection_.is_writable(); }
-  ssize_t read(char* to, std::size_t size) override { return connection_.read(to, size); }
-  ssize_t write(const char* from, std::size_t size) override { return connection_.write(from, size); }
-  void get_remote_ip_and_port(std::string& ip, int& port) const override { connection_.name_end(true, ip, port); }
-  void get_local_ip_and_port(std::string& ip, int& port) const override { connection_.name_end(false, ip, port); }
-  socket_t socket() const override { return connection_.socket(); }
-
- private:
-  WebConnection& connection_;
-};
-
-/// One request a connection, within bounds of size and time; the library has none for the headers as a whole.
-class Listener final : public httplib::Server {
- public:
-  /// The library's own queue of five loses connections that come at once.
-  void widen_queue() { ::listen(svr_sock_, WebServer::kMostConnections); }
-
- private:
-  bool process_and_close_socket(socket_t socket) override {
-    WebConnection connection(socket, WebServer::kMostHead + WebServer::kMostBody);
-    if (is_refusing) {
-      connection.refuse();
-      return false;
-    }
-    Connection stream(connection);
-    bool closed = false;
-    return process_request(stream, true, closed, nullptr);
-  }
-};
 
 /// In a time that does not tell how much of it is right.
 bool is_same(const std::string& a, const std::string& b) {
@@ -170,8 +60,11 @@ struct WebServer::Impl {
     return {&streams, [](std::atomic<int>* taken) { --*taken; }};
   }
 
+  /// There is a stream beside it.
+  bool gives_way() const { return content.recording == nullptr; }
+
   void set_up() {
-    server.new_task_queue = [this] { return new Workers(refused); };
+    server.new_task_queue = [this] { return new Workers(refused, kMostConnections, gives_way()); };
     server.set_payload_max_length(kMostBody);
     server.set_keep_alive_max_count(1);
     // Without the library's SO_REUSEPORT, by which two runs could share a port unawares.
@@ -212,8 +105,44 @@ struct WebServer::Impl {
     });
     server.Get("/events", [this](const httplib::Request&, httplib::Response& response) { send_events(response); });
     server.Get("/video\\.mjpg", [this](const httplib::Request&, httplib::Response& response) { send_video(response); });
+    if (content.recording != nullptr) serve_recording();
     server.Post("/control",
                 [this](const httplib::Request& request, httplib::Response& response) { control(request, response); });
+  }
+
+  /// `get` answers for a frame's number, as the request has it in `field`; what is damaged is told.
+  void get_numbered(const char* pattern, const char* field, std::size_t end,
+                    const std::function<void(std::size_t, httplib::Response&)>& get) {
+    server.Get(pattern, [field, end, get](const httplib::Request& request, httplib::Response& response) {
+      const std::string text = request.get_param_value(field);
+      constexpr std::size_t kMostDigits = 12;
+      const bool is_number =
+          !text.empty() && text.size() <= kMostDigits && text.find_first_not_of("0123456789") == std::string::npos;
+      const std::size_t number = is_number ? std::stoull(text) : end;
+      if (number >= end) return answer(response, 400, fmt::format("give {}= and a number below {}", field, end));
+      try {
+        get(number, response);
+      } catch (const Error& error) {
+        answer(response, 422, error.what());
+      }
+    });
+  }
+
+  void serve_recording() {
+    WebRecording& recording = *content.recording;
+    const std::size_t frames = recording.frames();
+    get_numbered("/track\\.json", "from", frames, [&recording](std::size_t from, httplib::Response& response) {
+      response.set_content(to_line(recording.track(from)) + "\n", "application/json");
+    });
+    get_numbered("/frame\\.json", "frame", frames, [&recording](std::size_t number, httplib::Response& response) {
+      response.set_content(to_line(recording.frame(number)) + "\n", "application/json");
+    });
+    get_numbered("/picture\\.jpg", "frame", frames, [&recording](std::size_t number, httplib::Response& response) {
+      const std::shared_ptr<const WebPicture> picture = recording.picture(number);
+      if (!picture) return answer(response, 404, "this frame was recorded without its picture");
+      response.set_header("X-Berth-Picture", picture->about);
+      response.set_content(picture->jpeg, "image/jpeg");
+    });
   }
 
   static std::string httplib_status(int status) {
@@ -349,7 +278,7 @@ struct WebServer::Impl {
   WebContent content;
   std::atomic<int> event_streams = 0, video_streams = 0;
   std::atomic<u64> refused = 0;
-  Listener server;
+  Listener server{kMostHead + kMostBody};
   std::thread thread;
 };
 
@@ -364,13 +293,13 @@ WebServer::WebServer(const WebAddress& address, WebContent content)
   }
   if (bound.port <= 0) {
     throw Error(
-        fmt::format("--view {}:{}: cannot be listened on: another program does, or the address is not this "
+        fmt::format("{} {}:{}: cannot be listened on: another program does, or the address is not this "
                     "machine's; give another port, or 0 for any",
-                    address.host, address.port));
+                    address.option, address.host, address.port));
   }
-  impl_->server.widen_queue();
+  impl_->server.widen_queue(kMostConnections);
   impl_->thread = std::thread([this] {
-    become_a_servant();
+    become_a_servant(impl_->gives_way());
     impl_->server.listen_after_bind();
   });
   // The library's stop does nothing before it listens.

@@ -8,6 +8,7 @@
 #include "web_address.hpp"
 #include "web_feed.hpp"
 #include "web_messages.hpp"
+#include "web_recording.hpp"
 
 namespace berth::cli {
 
@@ -21,6 +22,8 @@ struct WebContent {
   /// Whoever shows it may end the run; empty: nobody.
   std::string token;
   std::function<void()> end_run;
+  /// Null for a run.
+  WebRecording* recording = nullptr;
 };
 
 /// The page and its data over HTTP, one thread a connection and one request each. Threads are few and ordinary,

@@ -8,15 +8,14 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <random>
+#include <opencv2/core.hpp>
 #include <thread>
 
 #include "berth/error.hpp"
 #include "monotonic.hpp"
 #include "pipeline/thread_setup.hpp"
 #include "web_overlay.hpp"
+#include "web_picture.hpp"
 #include "web_server.hpp"
 #include "web_times.hpp"
 
@@ -25,9 +24,6 @@ namespace {
 
 /// Between two samples of poses, and between two pictures.
 constexpr double kSampleEveryS = 0.04, kPictureEveryS = 0.05;
-constexpr int kQuality = 80;
-/// Wider pictures are sent smaller.
-constexpr int kWidest = 1280;
 constexpr std::size_t kShortestToken = 16;
 
 std::string read_token(const std::string& path) {
@@ -46,15 +42,10 @@ std::string read_token(const std::string& path) {
   return token;
 }
 
-std::string random_name() {
-  std::random_device device;
-  return fmt::format("{:08x}{:08x}", device(), device());
-}
-
 class WebView final : public FrameObserver {
  public:
   WebView(const WebOptions& options, std::ostream& people, std::function<void()> end_run) {
-    about_.run = random_name();
+    about_.run = new_run_name();
     about_.source = options.source;
     about_.is_filtered = options.is_filtered;
     const std::string token = read_token(options.token_file);
@@ -174,10 +165,7 @@ class WebView final : public FrameObserver {
       const auto picture = std::make_shared<WebPicture>();
       picture->number = ++number;
       picture->about = to_line(to_json(overlay_));
-      const double shrink = static_cast<double>(kWidest) / pixels_.cols;
-      if (shrink < 1) cv::resize(pixels_, smaller_, cv::Size(), shrink, shrink, cv::INTER_AREA);
-      cv::imencode(".jpg", shrink < 1 ? smaller_ : pixels_, jpeg_, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-      picture->jpeg.assign(jpeg_.begin(), jpeg_.end());
+      picture->jpeg = pictures_.jpeg(pixels_);
       feed_.show(picture);
       lock.lock();
       is_filled_ = false;
@@ -201,8 +189,8 @@ class WebView final : public FrameObserver {
   std::mutex picture_mutex_;
   std::condition_variable filled_;
   bool is_filled_ = false, is_over_ = false;
-  cv::Mat pixels_, smaller_;
-  std::vector<unsigned char> jpeg_;
+  cv::Mat pixels_;
+  PictureEncoder pictures_;
   Overlay overlay_;
   std::thread encoder_;
   /// Goes first: its threads use what is above.

@@ -11,8 +11,8 @@
 namespace berth::mcap {
 namespace {
 
-/// No writer makes larger ones; a damaged or hostile size must not take the memory.
-constexpr u64 kMostRecord = u64{512} << 20, kMostChunk = u64{256} << 20;
+/// Of a chunk's records, as kMostRecord.
+constexpr u64 kMostChunk = u64{256} << 20;
 /// A chunk's fields without the compression's name and the data.
 constexpr u64 kChunkFields = 8 + 8 + 8 + 4 + 4 + 8;
 

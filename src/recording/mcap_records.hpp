@@ -11,6 +11,9 @@
 
 namespace berth::mcap {
 
+/// No writer makes larger records; a damaged or hostile size must not take the memory.
+inline constexpr u64 kMostRecord = u64{512} << 20;
+
 /// What a file is found to lack. Damage may be anywhere: so many are kept in words, and all are counted.
 class Problems {
  public:

@@ -5,6 +5,7 @@
 #include "berth/error.hpp"
 #include "fuzz/targets.hpp"
 #include "recording/cdr_reader.hpp"
+#include "recording/mcap_index.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/recover.hpp"
 #include "support/memory_file.hpp"
@@ -22,6 +23,15 @@ void recording_file(const u8* bytes, std::size_t count) {
     CdrReader fields(message->data, message->size);
     while (fields.ok()) fields.string();
     reader.schema_of_channel(message->channel);
+  }
+  const mcap::IndexedFile index(file.path(), [](const std::string&) { return true; });
+  mcap::ChunkCodec codec;
+  mcap::Bytes raw, records;
+  for (std::size_t i = 0; i < index.chunks().size(); ++i) {
+    if (!index.read_chunk(i, codec, raw, records).empty()) continue;
+    for (const auto& [channel, places] : index.chunks()[i].messages) {
+      for (const u64 place : places) mcap::message_at(records, place);
+    }
   }
   try {
     mcap::recover(file.path(), saved.path(), "fuzz");

@@ -1,4 +1,4 @@
-"""The live view in a browser: headless Chromium, driven by Playwright, watches a simulated run.
+"""The live view in a browser: headless Chromium, driven by Playwright, watches a simulated run, and a recording.
 
     view_page_test.py BERTH SOURCE_FOLDER CHROMIUM [--screenshots FOLDER]
 
@@ -70,6 +70,22 @@ class Run:
         if self.process.poll() is None:
             self.send(signal.SIGCONT)
             self.send(signal.SIGINT)
+        self.process.communicate(timeout=60)
+
+
+class View:
+    """`berth view` of a recording, for as long as it is looked at."""
+
+    def __init__(self, recording):
+        self.process = subprocess.Popen([ARGUMENTS.berth, "view", recording.name, "--address", "127.0.0.1:0"],
+                                        cwd=recording.parent, stdout=subprocess.PIPE, text=True)
+        self.url = self.process.stdout.readline().split()[-1]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGINT)
         self.process.communicate(timeout=60)
 
 
@@ -285,6 +301,98 @@ class ViewPage(unittest.TestCase):
             self.assertEqual([url for url in requests if not url.startswith(("file:", "data:", "blob:"))], [])
             self.assertEqual(complaints, [])
             page.close()
+
+    def test_a_looks_through_a_recording(self):
+        self.page.goto("about:blank")  # or it would go on drawing
+        with tempfile.TemporaryDirectory() as folder:
+            frames = 140 if ARGUMENTS.screenshots else 40
+            path, cut = pathlib.Path(folder) / "approach.mcap", pathlib.Path(folder) / "cut.mcap"
+            subprocess.run([ARGUMENTS.berth, "run", "--source", "sim:scenarios/approach.toml", "--max-frames", str(frames),
+                            "--backend", "simd", "--track", "--record", str(path)], cwd=ARGUMENTS.source, check=True,
+                           stdout=subprocess.DEVNULL)
+            cut.write_bytes(path.read_bytes()[:-1])
+            with View(path) as view:
+                self.look_through(view, frames)
+            with View(cut) as view:
+                page = self.context.new_page()
+                page.goto(view.url)
+                page.wait_for_function("() => document.getElementById('pose').textContent === 'VALID'")
+                self.assertIn("it is cut off", page.locator("#alarm").inner_text())
+                page.close()
+
+    def look_through(self, view, frames):
+        page = self.context.new_page()
+        complaints, requests = [], []
+        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(view.url)
+
+        def at(frame):
+            page.wait_for_function("""(text) => document.getElementById('frames').textContent === text &&
+                document.getElementById('moment-text').textContent.endsWith('frame ' + text)""", arg=f"{frame} of {frames}")
+            return page.locator("#range").inner_text(), page.locator("#age").inner_text()
+
+        at(1)
+        page.wait_for_function("() => document.getElementById('moment-note').textContent === ''")
+        page.wait_for_function("() => document.querySelectorAll('#times tr').length > 1")
+        for name in ["scrub", "range", "closing", "pose", "age", "video", "scene", "mode", "search", "why", "health"]:
+            self.assertTrue(page.locator("#" + name).is_visible(), name)
+        for name in ["video-on", "span", "clear", "log", "control"]:
+            self.assertTrue(page.locator("#" + name).is_hidden(), name)
+        self.assertEqual(page.locator("#plots canvas").count(), 6)
+        self.assertEqual(page.locator("#mode").inner_text(), "docking")
+        self.assertIn("the file is whole", page.locator("#health").inner_text())
+        self.assertIn("device", page.locator("#drops").inner_text())
+        self.assertTrue(page.locator("#alarm").is_hidden())
+        first = at(1)
+        # By the keyboard alone.
+        for _ in range(12):
+            page.keyboard.press("Tab")
+            if page.evaluate("() => document.activeElement.id") == "moment":
+                break
+        else:
+            self.fail("the slider is not reached")
+        drawn = page.locator("#video").get_attribute("data-count")
+        page.keyboard.press("ArrowRight")
+        self.assertNotEqual(at(2), first)
+        page.wait_for_function("(old) => document.getElementById('video').dataset.count !== old", arg=drawn)
+        page.keyboard.press("ArrowLeft")
+        self.assertEqual(at(1), first)
+        page.keyboard.press("PageUp")
+        per_second = page.evaluate("() => document.getElementById('moment').value")
+        self.assertGreater(int(per_second), 5)
+        at(int(per_second) + 1)
+        self.assertRegex(page.locator("#moment").get_attribute("aria-valuetext"), r"^(0\.9\d|1\.00) s, frame ")
+        page.keyboard.press("PageDown")
+        at(1)
+        page.keyboard.press("End")
+        self.assertNotEqual(at(frames)[0], first[0])
+        page.keyboard.press("Home")
+        at(1)
+        page.locator("#speed").select_option("5")
+        page.locator("#moment").focus()
+        page.keyboard.press("Space")
+        page.wait_for_function("() => document.getElementById('play').textContent === 'Pause'")
+        # It plays to the end and stops there.
+        page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
+        end = at(frames)
+        page.keyboard.press("Home")
+        at(1)
+        page.keyboard.press("Space")
+        page.keyboard.press("Space")
+        self.assertEqual(page.locator("#play").inner_text(), "Play")
+        if ARGUMENTS.screenshots:
+            page.locator("#moment").fill(str(frames * 2 // 3))
+            at(frames * 2 // 3 + 1)
+            page.wait_for_timeout(1000)
+            page.screenshot(path=str(pathlib.Path(ARGUMENTS.screenshots) / "live-view-recording.png"), full_page=True)
+        self.assertRegex(end[1], r"^\d+\.\d\d$")
+        self.assertNotIn("NaN", page.locator("body").inner_text())
+        self.assertLessEqual(page.evaluate("() => document.documentElement.scrollWidth"), SIZE["width"])
+        self.assertEqual([url for url in requests if not url.startswith((view.url, "data:", "blob:"))], [])
+        self.assertEqual(complaints, [])
+        page.close()
 
 
 if __name__ == "__main__":

@@ -1,12 +1,17 @@
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "console.hpp"
+#include "interrupt.hpp"
 #include "support/scratch_folder.hpp"
 
 namespace berth::test {
@@ -45,6 +50,22 @@ inline CommandRun run_berth(std::vector<std::string> arguments) {
   run.exit_code = cli::run_command(static_cast<int>(argv.size()), argv.data(), console);
   run.out = out.str();
   run.err = err.str();
+  return run;
+}
+
+/// One that ends by Ctrl-C alone.
+inline CommandRun run_berth_until_interrupted(std::vector<std::string> arguments) {
+  std::atomic<bool> is_over = false;
+  std::thread interrupt([&] {
+    // What comes before the command listens is lost.
+    while (!is_over) {
+      cli::InterruptWatch::ask();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  CommandRun run = run_berth(std::move(arguments));
+  is_over = true;
+  interrupt.join();
   return run;
 }
 

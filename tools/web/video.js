@@ -75,8 +75,13 @@
       // A picture that is only sent again says nothing new.
       if (/x-berth-repeated: *1/i.test(head)) return;
       const about = /x-berth-picture: *(.*)/i.exec(head);
+      await this.put(about ? JSON.parse(about[1]) : {}, bytes);
+    }
+
+    /// Shows this one.
+    async put(about, bytes) {
       const image = await createImageBitmap(new Blob([bytes], {type: 'image/jpeg'}));
-      this.picture = {image, about: about ? JSON.parse(about[1]) : {}};
+      this.picture = {image, about};
       ++this.count;
       this.canvas.dataset.count = this.count;
       this.fresh = true;

@@ -15,15 +15,19 @@
   };
 
   let about = {}, state = null, objects = [], tracks = [], chosen = -1, page = 'connecting', connected = false, connectedOnce = false;
-  let spoken = 0, drawn = 0, listed = 0;
+  let recording = null;         // what is looked through, in place of a run
+  let spoken = 0, drawn = 0, plotted = 0, listed = 0;
 
   const video = new berth.Video($('video'), 'video.mjpg');
   const plots = berth.axes.map((axis, i) => new berth.Plot($('plots'), axis, i));
   const scene = new berth.Scene($('scene'), [...document.querySelectorAll('[data-view]')]);
   const stream = new berth.Stream('events', {
     about: (message) => {
+      if (recording && about.run === message.run) return;  // connected again
       if (about.run && about.run !== message.run) note('another run');
       about = message;
+      if (recording) recording.close();
+      recording = null;
       objects = [];
       tracks = [];
       chosen = -1;
@@ -31,6 +35,8 @@
       scene.clear();
       scene.about(about);
       $('object').length = 1;
+      openRecording();
+      watch();
       $('source').textContent = about.source;
       $('source').title = about.source;
       $('control').hidden = !about.control;
@@ -48,6 +54,7 @@
   function take(message) {
     const before = state;
     state = message;
+    if (recording) return;
     (message.objects || []).forEach((object, i) => {
       const at = message.objects_from + i;
       objects[at] = object;
@@ -62,6 +69,33 @@
     if (message.samples) scene.dirty = true;
     if (message.times) showTimes(message.times);
     if (before && before.frames && message.frames) compare(before, message);
+  }
+
+  function openRecording() {
+    $('scrub').hidden = !about.recording;
+    say('age-name', about.recording ? 'At' : 'Age of data');
+    if (!about.recording) {
+      delete document.documentElement.dataset.recording;
+      return;
+    }
+    document.documentElement.dataset.recording = '';
+    recording = new berth.Recording(about, {
+      track: (all, samples, stages) => {
+        for (let at = objects.length; at < all.length; ++at) {
+          objects[at] = all[at];
+          tracks[at] = [];
+          $('object').add(new Option(all[at].name, String(at)));
+        }
+        samples.forEach((sample) => tracks[sample.object].push(sample));
+        showTimes(stages);
+      },
+      picture: (picture, bytes) => {
+        if (picture) return video.put(picture, bytes);
+        video.forget();
+        video.fresh = true;
+      },
+      changed: () => { plotted = listed = 0; },
+    });
   }
 
   /// What changed from one state to the next and is worth a line.
@@ -83,6 +117,12 @@
     while ($('log').children.length > 50) $('log').lastChild.remove();
   }
 
+  /// A run's video, where somebody sees it; a recording's pictures come one by one.
+  function watch() {
+    if (about.run && !recording && $('video-on').checked && !document.hidden) video.start();
+    else video.stop();
+  }
+
   // ---- what is live ----
 
   /// s from one frame to the next; in the first second, while that is not known, a fast camera's.
@@ -92,14 +132,19 @@
   const age = () => (state && state.frames ? Math.max(0, stream.now() - state.captured) : null);
 
   function judge() {
+    if (recording && stream.silence() <= kGone) return 'recording';
     if (!state || stream.silence() > kGone) return state && state.ended ? 'ended' : connectedOnce ? 'lost' : 'connecting';
     if (state.ended) return 'ended';
     if (!state.frames) return 'waiting';
     return age() > limit() ? 'stale' : 'live';
   }
 
-  /// The object's newest sample, where the newest frame shows it; or null.
+  /// Whether values belong to a frame that may be looked at: the newest, or the recording's.
+  const isShown = () => page === 'live' || page === 'recording';
+
+  /// The object's newest sample, where the newest frame shows it, or the recording's frame does; or null.
   function seen(at) {
+    if (recording) return recording.seen(objects[at], tracks[at] || []);
     const track = tracks[at] || [], last = track[track.length - 1];
     return last && state.finished - last.time <= Math.max(0.25, 2.5 * period()) ? last : null;
   }
@@ -111,7 +156,8 @@
       chosen = Number($('object').value);
       return;
     }
-    if (chosen >= 0 && state.frames && last(chosen) && state.finished - last(chosen).time < 3) return;
+    if (chosen >= 0 && recording && seen(chosen)) return;
+    if (chosen >= 0 && !recording && state.frames && last(chosen) && state.finished - last(chosen).time < 3) return;
     let best = -1;
     const better = (a, b) => kRankOf[objects[a].kind] - kRankOf[objects[b].kind] || objects[b].size - objects[a].size || a - b;
     objects.forEach((object, i) => {
@@ -133,10 +179,10 @@
     if (now !== page && page === 'stale' && now === 'live') note('data are live again');
     page = now;
     document.documentElement.dataset.state = page;
-    say('pill', {connecting: 'Connecting', waiting: 'Waiting for a frame', live: 'Live', stale: 'Stale', lost: 'No connection', ended: 'Ended'}[page]);
-    const alarm = kAlarms[page], since = page === 'lost' ? stream.silence() : age();
+    say('pill', {connecting: 'Connecting', waiting: 'Waiting for a frame', live: 'Live', recording: 'Recording', stale: 'Stale', lost: 'No connection', ended: 'Ended'}[page]);
+    const alarm = page === 'recording' && recording.lack ? ['NOT THE WHOLE FILE', () => recording.lack + '.'] : kAlarms[page], since = page === 'lost' ? stream.silence() : age();
     $('alarm').hidden = !alarm;
-    $('alarm').classList.toggle('calm', page === 'ended');
+    $('alarm').classList.toggle('calm', page === 'ended' || page === 'recording');
     if (alarm) {
       say('alarm-title', alarm[0]);
       // Aloud once and then every few seconds, not with each tenth.
@@ -150,7 +196,7 @@
   }
 
   function showGlance() {
-    const sample = page === 'live' && chosen >= 0 ? seen(chosen) : null, name = chosen >= 0 ? objects[chosen].name : '';
+    const sample = isShown() && chosen >= 0 ? seen(chosen) : null, name = chosen >= 0 ? objects[chosen].name : '';
     say('range', sample ? berth.measured(sample.range, sample.rangeDeviation, 4) : '—');
     say('range-sub', sample ? '± ' + berth.length(sample.rangeDeviation) : '\u00a0');
     const speed = sample && sample.closing !== null ? sample.closing * 1000 : null;
@@ -159,6 +205,14 @@
     say('closing-sub', speed === null ? (sample ? 'takes half a second of poses' : '\u00a0') :
       '± ' + berth.fixed((sample.closingDeviation || 0) * 1000, 1) + ' mm/s' + (speed > 1 && speed > 2000 * (sample.closingDeviation || 0) ? ', ' + berth.duration(sample.range / (speed / 1000)) + ' left' : ''));
     showPose(sample, name);
+    if (page === 'recording') {
+      say('age', berth.fixed(recording.time, 2));
+      say('age-unit', 's');
+      say('age-sub', recording.frame && recording.frame.missed ? 'behind ' + berth.count(recording.frame.missed) + ' frames that were dropped' : 'from the first frame');
+      grade('age-card', '');
+      document.title = (sample ? berth.fixed(sample.range, 3) + ' m' : 'not seen') + ' at ' + berth.fixed(recording.time, 2) + ' s · Berth';
+      return;
+    }
     const old = page === 'lost' ? stream.silence() : age();
     const isSlow = old !== null && old >= 1;
     say('age', old === null || page === 'ended' ? '—' : isSlow ? berth.fixed(old, 1) : String(Math.round(old * 1000)));
@@ -175,14 +229,14 @@
       say('pose-sub', 'no pose is shown');
       return grade('pose-card', 'bad');
     }
-    if (page !== 'live') {
+    if (!isShown() || (recording && !recording.frame)) {
       say('pose', '—');
       say('pose-sub', '\u00a0');
       return grade('pose-card', '');
     }
     if (!sample) {
       say('pose', 'NOT SEEN');
-      say('pose-sub', before ? name + ': last ' + berth.duration(state.finished - before.time) + ' ago' : 'no object has had a pose');
+      say('pose-sub', recording ? recording.frame.wrong || 'not in this frame' : before ? name + ': last ' + berth.duration(state.finished - before.time) + ' ago' : 'no object has had a pose');
       return grade('pose-card', 'warn');
     }
     const isDoubtful = sample.ambiguity > 0.6;
@@ -192,22 +246,31 @@
   }
 
   function showPlots() {
+    const track = tracks[chosen] || [], sample = isShown() && chosen >= 0 ? seen(chosen) : null;
+    say('plots-note', chosen < 0 ? '' : objects[chosen].name + (about.filtered ? ', closing speed filtered' : ''));
+    if (recording) {
+      plots.forEach((plot) => {
+        plot.draw(track, 0, Math.max(1e-3, recording.length), recording.gap, berth.since, {cursor: recording.time});
+        plot.read(sample);
+      });
+      scene.show(track, sample, chosen >= 0 ? objects[chosen].size : 0, recording.gap);
+      return;
+    }
     const span = Number($('span').value), to = page === 'ended' ? state.finished : stream.now();
-    const track = tracks[chosen] || [], sample = page === 'live' && chosen >= 0 ? seen(chosen) : null;
     plots.forEach((plot) => {
       plot.draw(track, to - Math.min(span, kOldest), to, gap(), berth.ago);
       plot.read(sample);
     });
-    say('plots-note', chosen < 0 ? '' : objects[chosen].name + (about.filtered ? ', closing speed filtered' : ''));
     scene.show(track, sample, chosen >= 0 ? objects[chosen].size : 0, gap());
   }
 
   function showCards() {
-    const s = state;
-    if (!s.frames) return;
+    const s = recording ? recording.frame : state;
+    if (!s || (recording ? s.wrong : !s.frames)) return;
     say('mode', s.mode);
     say('search', s.search);
     say('why', s.why || 'markers are not followed (--track)');
+    if (recording) return showRecorded(s);
     say('backend', about.backend && about.backend.startsWith(s.backend) ? about.backend : s.backend);
     say('frames', berth.count(s.frames) + ', ' + berth.fixed(100 * s.with_pose / s.frames, 1) + ' % with a pose');
     say('rate', page === 'live' ? berth.fixed(s.fps, 1) + ' frames/s' : '—');
@@ -224,6 +287,19 @@
     showSeen();
   }
 
+  /// What the recording says of this frame, and of all.
+  function showRecorded(frame) {
+    const whole = recording.times.length === recording.count;
+    say('backend', frame.backend);
+    say('frames', berth.count(frame.frame + 1) + ' of ' + berth.count(recording.count));
+    say('rate', whole && recording.length > 0 ? berth.fixed((recording.count - 1) / recording.length, 1) + ' frames/s on average' : '—');
+    say('label', frame.label);
+    say('drops', 'This frame: ' + Object.entries(frame.times).filter(([, us]) => us > 0).map(([name, us]) => name + ' ' + berth.fixed(us / 1000, 2) + ' ms').join(', ') +
+      '. Above: ' + (whole ? 'all of the recording.' : 'what was read so far.'));
+    list('health', recording.lines());
+    showSeen();
+  }
+
   function showHealth(s) {
     const lines = [];
     const camera = s.camera, total = camera.lost + camera.incomplete;
@@ -235,10 +311,15 @@
     if (s.pipeline && s.pipeline.run_again) lines.push(['warn', berth.count(s.pipeline.run_again) + ' frames run again on another backend']);
     lines.push(['', 'viewers: ' + s.viewers.events + (s.viewers.refused ? ', ' + s.viewers.refused + ' turned away' : '')]);
     if (video.refused) lines.push(['warn', 'too many watch the video; trying again']);
+    list('health', lines);
+  }
+
+  /// Lines of a grade and words, where they are others than before.
+  function list(id, lines) {
     const text = JSON.stringify(lines);
-    if ($('health').dataset.text === text) return;
-    $('health').dataset.text = text;
-    $('health').replaceChildren(...lines.map(([name, words]) => {
+    if ($(id).dataset.text === text) return;
+    $(id).dataset.text = text;
+    $(id).replaceChildren(...lines.map(([name, words]) => {
       const item = document.createElement('li');
       item.className = name;
       item.textContent = words;
@@ -248,7 +329,7 @@
 
   function showSeen() {
     $('seen').replaceChildren(...objects.map((object, i) => {
-      const row = document.createElement('tr'), sample = page === 'live' ? seen(i) : null, before = last(i);
+      const row = document.createElement('tr'), sample = isShown() ? seen(i) : null, before = recording ? null : last(i);
       row.className = i === chosen ? 'chosen' : '';
       [object.name, sample ? berth.measured(sample.range, sample.rangeDeviation, 4) : '—', sample ? berth.fixed(sample.error, 2) : '—',
         sample ? 'now' : before && page !== 'lost' ? berth.duration(state.finished - before.time) + ' ago' : '—'].forEach((text) => { row.insertCell().textContent = text; });
@@ -265,12 +346,16 @@
   }
 
   function showVideo() {
+    video.overlay = $('overlay-on').checked;
+    if (recording) {
+      say('video-note', video.picture ? video.picture.about.width + ' × ' + video.picture.about.height : '');
+      return video.draw(page === 'recording', null);
+    }
     if (!$('video-on').checked) say('video-note', 'off');
     else if (!video.picture) say('video-note', '');
     const picture = video.picture, old = picture ? Math.max(0, stream.now() - picture.about.captured) : null;
     const isLive = page === 'live' && $('video-on').checked && old !== null && old <= limit() + 0.5;
     if (picture && $('video-on').checked) say('video-note', picture.about.width + ' × ' + picture.about.height + (isLive ? ', ' + Math.round(old * 1000) + ' ms old' : ''));
-    video.overlay = $('overlay-on').checked;
     video.draw(isLive, old);
   }
 
@@ -285,7 +370,11 @@
     }
     if (berth.now() - drawn < 0.09) return;
     drawn = berth.now();
-    showPlots();
+    // Nothing of a recording moves by itself.
+    if (!recording || berth.now() - plotted > 0.5) {
+      plotted = drawn;
+      showPlots();
+    }
     scene.draw();
     if (berth.now() - listed < 0.4) return;
     listed = berth.now();
@@ -299,7 +388,6 @@
     tracks = tracks.map(() => []);
     scene.clear();
   });
-  const watch = () => ($('video-on').checked && !document.hidden ? video.start() : video.stop());
   $('video-on').addEventListener('change', watch);
   document.addEventListener('visibilitychange', watch);
   $('control-form').addEventListener('submit', async (event) => {
@@ -321,6 +409,5 @@
       say('control-note', 'Berth did not answer.');
     }
   });
-  watch();
   setInterval(tick, 50);
 })(window.berth);
