@@ -98,13 +98,14 @@ std::size_t on_painted_stack(Run& run) {
   pthread_join(thread, nullptr);
   pthread_attr_destroy(&attributes);
   const u8* const end = stack.get() + kStackBytes;
-  return static_cast<std::size_t>(end - std::find_if(static_cast<const u8*>(stack.get()), end,
-                                                     [](u8 byte) { return byte != kPaint; }));
+  return static_cast<std::size_t>(
+      end - std::find_if(static_cast<const u8*>(stack.get()), end, [](u8 byte) { return byte != kPaint; }));
 }
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app("The flight core (docs/flight-core.md): memory, stack, allocations, slowest frames. Processor ms a frame.");
+  CLI::App app(
+      "The flight core (docs/flight-core.md): memory, stack, allocations, slowest frames. Processor ms a frame.");
   app.add_option("--frames", options.frames, "Frames in all")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--corners", options.corners, "How corners are had")
       ->check(CLI::IsMember({"edges", "photometric"}))

@@ -44,6 +44,7 @@ HWY_INLINE unsigned bits(Mask mask) {
   return bytes[0];
 }
 
+// Always with values: a constructor that the compiler makes has not the vectors' instruction set.
 struct Coefficients {
   V c, x, y, xx, xy, yy;
 };
@@ -65,15 +66,14 @@ HWY_INLINE Coefficients linear(const std::array<double, 3>& h, const Coefficient
 
 // A quotient's series, order by order: the product with the depth has the numerator's. `scale`: 1 / depth.c.
 HWY_INLINE Coefficients quotient(const Coefficients& n, const Coefficients& depth, V scale) {
-  Coefficients q;
-  q.c = hn::Mul(n.c, scale);
-  q.x = hn::Mul(hn::Sub(n.x, hn::Mul(q.c, depth.x)), scale);
-  q.y = hn::Mul(hn::Sub(n.y, hn::Mul(q.c, depth.y)), scale);
-  q.xx = hn::Mul(hn::Sub(hn::Sub(n.xx, hn::Mul(q.c, depth.xx)), hn::Mul(q.x, depth.x)), scale);
-  const V mixed = hn::Sub(hn::Sub(n.xy, hn::Mul(q.c, depth.xy)), hn::Mul(q.x, depth.y));
-  q.xy = hn::Mul(hn::Sub(mixed, hn::Mul(q.y, depth.x)), scale);
-  q.yy = hn::Mul(hn::Sub(hn::Sub(n.yy, hn::Mul(q.c, depth.yy)), hn::Mul(q.y, depth.y)), scale);
-  return q;
+  const V c = hn::Mul(n.c, scale);
+  const V x = hn::Mul(hn::Sub(n.x, hn::Mul(c, depth.x)), scale);
+  const V y = hn::Mul(hn::Sub(n.y, hn::Mul(c, depth.y)), scale);
+  const V xx = hn::Mul(hn::Sub(hn::Sub(n.xx, hn::Mul(c, depth.xx)), hn::Mul(x, depth.x)), scale);
+  const V mixed = hn::Sub(hn::Sub(n.xy, hn::Mul(c, depth.xy)), hn::Mul(x, depth.y));
+  const V xy = hn::Mul(hn::Sub(mixed, hn::Mul(y, depth.x)), scale);
+  const V yy = hn::Mul(hn::Sub(hn::Sub(n.yy, hn::Mul(c, depth.yy)), hn::Mul(y, depth.y)), scale);
+  return {c, x, y, xx, xy, yy};
 }
 
 struct Verdict {
