@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "berth/error.hpp"
+#include "frame/result_digest.hpp"
 #include "frame_observer.hpp"
-#include "result_digest.hpp"
 #include "stream.hpp"
 #include "support/counted_allocations.hpp"
 #include "support/fake_v4l2.hpp"

@@ -143,9 +143,9 @@ TEST(RosHealth, SaysWhatIsWrongAndCounts) {
   FrameResult result;
   result.stamp.sequence = 10;
   result.detections = {marker(3, true)};
-  health.add(result, 2'000'000);
+  health.add(result, {}, 2'000'000);
   result.stamp.sequence = 13;  // two were dropped
-  health.add(result, 4'000'000);
+  health.add(result, {}, 4'000'000);
   const auto& dropped = health.report(5, 0.5, {1, 2, ""}).status[0];
   EXPECT_EQ(dropped.level, ros2::Level::warn);
   EXPECT_EQ(dropped.message, "2 frames dropped");
@@ -153,22 +153,32 @@ TEST(RosHealth, SaysWhatIsWrongAndCounts) {
   for (const auto& [key, value] : dropped.values) values.append(key).append("=" + value + " ");
   EXPECT_EQ(values,
             "frames=2 frames_with_pose=2 frames_per_second=4.0 frames_dropped=2 frames_not_published=1 "
-            "messages_not_sent=2 latency_p50_ms=2.007 latency_p99_ms=4.000 ");
+            "messages_not_sent=2 mode=nominal valid=true known_answers=0 wrong_answers=0 memory_alterations=0 "
+            "latency_p50_ms=2.007 latency_p99_ms=4.000 ");
   EXPECT_EQ(health.report(5, 1.5, {}).status[0].level, ros2::Level::stale);
   result.stamp.sequence = 14;
-  health.add(result, -1);
+  health.add(result, {}, -1);
   EXPECT_EQ(health.report(5, 1, {}).status[0].level, ros2::Level::ok);
   ++result.stamp.sequence;
-  health.add(result, -1);
+  health.add(result, {}, -1);
   EXPECT_THAT(health.report(5, 1, {0, 0, "pose (reliability)"}).status[0].message, HasSubstr("pose (reliability)"));
   ++result.stamp.sequence;
   result.status = FrameStatus::overflow;
-  health.add(result, -1);
+  health.add(result, {}, -1);
   EXPECT_EQ(health.report(5, 1, {}).status[0].level, ros2::Level::warn);
   ++result.stamp.sequence;
   result.status = FrameStatus::device_lost;
-  health.add(result, -1);
+  health.add(result, {}, -1);
   EXPECT_EQ(health.report(5, 1, {}).status[0].level, ros2::Level::error);
+  ++result.stamp.sequence;
+  result.status = FrameStatus::ok;
+  HealthReport engine;
+  engine.mode = HealthMode::fallback;
+  engine.reason = "a wrong known answer";
+  health.add(result, engine, -1);
+  const auto& fallback = health.report(5, 1, {}).status[0];
+  EXPECT_EQ(fallback.level, ros2::Level::warn);
+  EXPECT_THAT(fallback.message, HasSubstr("another carries on, with the same bits: a wrong known answer"));
 }
 
 TEST(BoundedWorker, TakesWhatThereIsRoomForAndHoldsNobodyUp) {

@@ -19,6 +19,7 @@
 #include "support/command_run.hpp"
 #include "support/complaint.hpp"
 #include "support/web_client.hpp"
+#include "web_messages.hpp"
 #include "web_samples.hpp"
 
 namespace berth::cli {
@@ -124,8 +125,8 @@ struct Frame {
     result.stamp.mid_exposure_ns = static_cast<std::int64_t>(time_s * 1e9);
   }
   ObservedFrame observed() const {
-    return {label,         image.view(), result, 0,  Mode::docking, camera, nullptr, nullptr, truth,
-            truth_targets, "simd",       0,      {}, nullptr,       nullptr};
+    return {label, image.view(), result, 0,       Mode::docking, camera, nullptr, nullptr, truth, truth_targets, "simd",
+            0,     {},           {},     nullptr, nullptr};
   }
 };
 
@@ -134,6 +135,22 @@ DetectorConfig config() {
   config.camera = paper_camera(320, 240);
   config.marker_size_m = 0.1;
   return config;
+}
+
+TEST(WebStatus, SaysWhatTheNewestResultIsWorth) {
+  WebStatus status;
+  status.frames = 1;
+  status.finished_s = 10;
+  status.status = FrameStatus::ok;
+  EXPECT_EQ(to_json(status, 10.5, false)["valid"], true);
+  EXPECT_EQ(to_json(status, 10.5, false)["health"]["mode"], "nominal");
+  EXPECT_EQ(to_json(status, 11.5, false)["valid"], false);
+  EXPECT_EQ(to_json(status, 11.5, false)["health"]["mode"], "stale");
+  EXPECT_EQ(to_json(status, 11.5, true)["valid"], true);  // the run is over, not stuck
+  status.engine.mode = HealthMode::fallback;
+  EXPECT_EQ(to_json(status, 10.5, false)["health"]["mode"], "fallback");
+  status.status = FrameStatus::device_lost;
+  EXPECT_EQ(to_json(status, 10.5, false)["valid"], false);
 }
 
 TEST(WebSampler, FindsTheClosingSpeedByTheCamerasClock) {

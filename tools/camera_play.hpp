@@ -40,6 +40,7 @@ class CameraPlay final : public Play {
 
   void describe(std::ostream& out) const;
   PipelineCounts counts() const override { return pipeline_.counts(); }
+  HealthReport engine() const override { return pipeline_.health(); }
   SourceHealth health() const override;
   void sum_up(std::ostream& out) const override;
   Json summary() const override;

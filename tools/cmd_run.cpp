@@ -20,6 +20,9 @@
 namespace berth::cli {
 namespace {
 
+/// Usual time between known answers, s: one takes as long as a frame.
+constexpr double kKnownAnswerS = 10;
+
 constexpr const char* kExamples = R"(Examples:
   berth run --source sim:scenarios/approach.toml
   berth run --source video:approach.mp4 --camera cam.yaml --size 0.08 --json log.jsonl
@@ -111,6 +114,14 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--max-frames", options->stream.max_frames, "end after so many frames, 0 for all")
       ->type_name("N")
       ->capture_default_str();
+  CLI::Option* known_answer =
+      command
+          ->add_option("--known-answer", options->stream.known_answer_s,
+                       "at start and every so many seconds a picture with a known answer, memory checked all the "
+                       "while; what fails gives way to --fallback (docs/reliability.md); 0 for none [10 at a camera's "
+                       "pace, else none]")
+          ->type_name("SECONDS")
+          ->check(CLI::Range(0.0, 1e6));
   add_record_options(*command, options->record);
   add_report_option(*command, options->web);
   add_view_options(*command, options->web);
@@ -143,7 +154,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   add_deviation_options(*command, options->stream.engine);
   add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
-  command->callback([options, &console, &exit_code, pipeline, stream] {
+  command->callback([options, &console, &exit_code, pipeline, stream, known_answer] {
     PaceOptions& given = options->stream.pace;
     const bool is_camera = names_camera(options->source);
     if (given.fps != 0 && is_camera) {
@@ -158,6 +169,12 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       throw Error((stream->count() > 0 ? "--stream" : (*set)->get_name()) +
                   " is for a camera's frames (v4l2:, aravis:, gst:); play those of a recording by --fps");
     }
+    if (options->stream.known_answer_s > 0 && !options->stream.engine.lockstep.empty()) {
+      throw Error(
+          "--known-answer asks one backend at a time, and --lockstep compares every frame of two; leave one of "
+          "the two out");
+    }
+    if (known_answer->count() == 0 && (is_camera || given.fps != 0)) options->stream.known_answer_s = kKnownAnswerS;
     if (options->stream.track && !options->stream.engine.target_files.empty()) {
       throw Error(
           "--track searches in windows, which show markers alone; --target needs whole frames: leave one of the two "

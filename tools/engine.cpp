@@ -243,8 +243,8 @@ bool wants_poses(const DetectorConfig& config) {
 }
 
 Engine::Engine(EngineBackends backends, DetectorConfig config, CameraFit fit,
-               const std::optional<TrackerConfig>& tracking)
-    : backends_(std::move(backends)), config_(std::move(config)), fit_(fit), tracking_(tracking) {}
+               const std::optional<TrackerConfig>& tracking, const std::optional<HealthConfig>& health)
+    : backends_(std::move(backends)), config_(std::move(config)), fit_(fit), tracking_(tracking), health_(health) {}
 
 std::string Engine::describe() const {
   const auto named = [](Backend& backend) { return std::string(backend.name()) + " on " + backend.device().name; };
@@ -294,6 +294,10 @@ std::vector<Backend*> Engine::backends() const {
   return chain;
 }
 
+HealthReport Engine::health() const {
+  return detectors_.empty() || !detectors_.front().alone ? HealthReport() : detectors_.front().alone->health();
+}
+
 Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
   const auto known = std::find_if(detectors_.begin(), detectors_.end(), [&](const Sized& sized) {
     return sized.width == image.width && sized.height == image.height;
@@ -314,7 +318,7 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
   if (backends_.lockstep) {
     sized.pair = std::make_unique<Lockstep>(*chain[0], *chain[1], image.width, image.height, config);
   } else {
-    sized.alone = std::make_unique<FailoverDetector>(chain, image.width, image.height, config);
+    sized.alone = std::make_unique<FailoverDetector>(chain, image.width, image.height, config, health_);
   }
   sized.detect(image, stamp);
   detectors_.insert(detectors_.begin(), std::move(sized));

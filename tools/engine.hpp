@@ -92,9 +92,10 @@ struct TimedResult {
 /// said how it fits.
 class Engine {
  public:
-  /// `tracking`: markers are followed in windows, frame after frame.
+  /// `tracking`: markers are followed in windows, frame after frame. `health`: not for those in lockstep.
   Engine(EngineBackends backends, DetectorConfig config, CameraFit fit = CameraFit::none,
-         const std::optional<TrackerConfig>& tracking = std::nullopt);
+         const std::optional<TrackerConfig>& tracking = std::nullopt,
+         const std::optional<HealthConfig>& health = std::nullopt);
 
   /// Detects; the result is valid until the next call. The detector of a size is warmed up by one detection outside the
   /// timing (first touch of its memory, kernels loaded).
@@ -112,6 +113,8 @@ class Engine {
   DetectorConfig config_for(int width, int height) const;
   /// In order of fail-over.
   std::vector<Backend*> backends() const;
+  /// Of the detector of the frames that came last.
+  HealthReport health() const;
   bool is_lockstep() const { return backends_.lockstep; }
   /// The one whose results are given: it changes when a device is lost.
   Backend& backend() { return *backends_.backends[active_]; }
@@ -140,6 +143,7 @@ class Engine {
   DetectorConfig config_;
   CameraFit fit_;
   std::optional<TrackerConfig> tracking_;
+  std::optional<HealthConfig> health_;
   /// Most recently used first.
   std::vector<Sized> detectors_;
 };

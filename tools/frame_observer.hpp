@@ -9,6 +9,7 @@
 #include "berth/camera.hpp"
 #include "berth/detector.hpp"
 #include "berth/frame.hpp"
+#include "berth/health.hpp"
 #include "berth/image.hpp"
 #include "berth/pilot.hpp"
 #include "berth/pipeline.hpp"
@@ -57,6 +58,8 @@ struct ObservedFrame {
   std::int64_t wall_ns = 0;
   /// What its camera has been through so far.
   SourceHealth health;
+  /// How the engine is.
+  HealthReport engine;
   /// The markers' tracks, this frame in them, where poses are filtered; null otherwise.
   const MarkerFilters* filters = nullptr;
   /// The pipeline's counts so far; null where there is none.

@@ -33,6 +33,7 @@ ObservedFrame QueuedFrame::observed(View2D<const u8> image) const {
           backend,
           wall_ns,
           health,
+          engine,
           nullptr,
           nullptr};
 }
@@ -95,6 +96,7 @@ void FrameQueue::push(const ObservedFrame& frame, std::int64_t came_ns, bool wai
   to->backend = frame.backend;
   to->wall_ns = frame.wall_ns;
   to->health = frame.health;
+  to->engine = frame.engine;
   to->came_ns = came_ns;
   to->filtered = frame.filters != nullptr ? frame.filters->to_json() : Json();
   if (to->picture >= 0) copy(frame.image, images_[static_cast<std::size_t>(to->picture)]);

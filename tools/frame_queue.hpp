@@ -29,6 +29,7 @@ struct QueuedFrame {
   const char* backend = "";
   std::int64_t wall_ns = 0;
   SourceHealth health;
+  HealthReport engine;
   /// When it was handed over: nanoseconds since 1970.
   std::int64_t came_ns = 0;
   /// Filtered poses, where there is a filter.

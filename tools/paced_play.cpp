@@ -12,10 +12,10 @@
 #include "berth/error.hpp"
 #include "camera/bad_input.hpp"
 #include "frame/digest.hpp"
+#include "frame/result_digest.hpp"
 #include "monotonic.hpp"
 #include "pipeline/thread_setup.hpp"
 #include "pipeline_show.hpp"
-#include "result_digest.hpp"
 #include "source_arguments.hpp"
 
 namespace berth::cli {

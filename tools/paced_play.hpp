@@ -67,6 +67,7 @@ class PacedPlay final : public Play {
   const SourceFrame& source_of(const PipelineFrame& frame) const;
   bool is_first_round(const PipelineFrame& frame) const { return frame.result->stamp.sequence < frames_.size(); }
   PipelineCounts counts() const override { return pipeline_.counts(); }
+  HealthReport engine() const override { return pipeline_.health(); }
   /// Ends the play early.
   void end() { camera_.end(); }
 

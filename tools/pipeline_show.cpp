@@ -6,6 +6,8 @@
 #include <array>
 #include <utility>
 
+#include "health_show.hpp"
+
 namespace berth::cli {
 namespace {
 
@@ -57,6 +59,7 @@ Json to_json(const Pipeline& pipeline, const std::vector<double>& deadlines_ms) 
   for (std::size_t i = 0; i < kDropCauses; ++i) {
     json["dropped"][name_of(static_cast<DropCause>(i))] = counts.dropped[i];
   }
+  json["health"] = to_json(pipeline.health());
   for (std::size_t i = 0; i < deadlines_ms.size(); ++i) {
     json["late"].push_back({{"deadline_ms", deadlines_ms[i]}, {"frames", counts.late[i]}});
   }

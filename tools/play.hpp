@@ -14,6 +14,8 @@ class Play {
   virtual ~Play() = default;
   /// So far.
   virtual PipelineCounts counts() const = 0;
+  /// How the engine is.
+  virtual HealthReport engine() const = 0;
   /// What a camera has been through so far; all 0 where there is none.
   virtual SourceHealth health() const { return {}; }
   /// For people.

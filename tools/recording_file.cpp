@@ -9,6 +9,7 @@
 #include "berth/error.hpp"
 #include "camera/recorded_frame.hpp"
 #include "frame_record.hpp"
+#include "health_show.hpp"
 #include "monotonic.hpp"
 #include "ros2/messages.hpp"
 
@@ -149,11 +150,19 @@ void RecordingFile::write_health(const QueuedFrame& frame, std::uint64_t dropped
                           "",
                           {number("lost", health.lost), number("incomplete", health.incomplete),
                            number("skipped", health.skipped), number("reopened", health.reopened)}});
-  array.status.push_back({frame.result.status == FrameStatus::device_lost ? ros2::Level::error : ros2::Level::ok,
+  const HealthMode mode = mode_of(frame.engine, frame.result.status);
+  array.status.push_back({mode == HealthMode::failed    ? ros2::Level::error
+                          : mode == HealthMode::nominal ? ros2::Level::ok
+                                                        : ros2::Level::warn,
                           "berth: engine",
                           name_of(frame.result.status),
                           backend_,
-                          {}});
+                          {{"mode", name_of(mode)},
+                           {"reason", frame.engine.reason},
+                           number("known_answers", frame.engine.known_answers),
+                           number("wrong_answers", frame.engine.wrong_answers),
+                           number("checked_bytes", frame.engine.checked_bytes),
+                           number("alterations", frame.engine.alterations)}});
   ros2::write(array, cdr_);
   send(health_);
 }

@@ -16,7 +16,7 @@ bool has_pose(const FrameResult& result) {
 
 }  // namespace
 
-void RosHealth::add(const FrameResult& result, std::int64_t latency_ns) {
+void RosHealth::add(const FrameResult& result, const HealthReport& engine, std::int64_t latency_ns) {
   // Numbers that were passed over belong to frames that were dropped on the way.
   const std::uint64_t sequence = result.stamp.sequence;
   if (frames_ > 0 && sequence > next_sequence_) {
@@ -28,21 +28,30 @@ void RosHealth::add(const FrameResult& result, std::int64_t latency_ns) {
   ++new_frames_;
   with_pose_ += has_pose(result) ? 1 : 0;
   new_overflows_ += result.status == FrameStatus::overflow ? 1 : 0;
+  engine_ = engine;
   lost_device_ = result.status == FrameStatus::device_lost;
   if (latency_ns >= 0) latencies_.add(latency_ns);
 }
 
 const ros2::DiagnosticArray& RosHealth::report(std::int64_t stamp_ns, double seconds, const Beside& beside) {
   ros2::Level level = ros2::Level::ok;
-  message_ = "frames come out whole";
+  HealthMode mode = engine_.mode;
+  message_ = text_of(mode);
   if (lost_device_) {
     level = ros2::Level::error;
-    message_ = "the device was lost";
+    mode = HealthMode::failed;
+    message_ = engine_.wrong_answers + engine_.alterations > 0 ? fmt::format("{}: {}", text_of(mode), engine_.reason)
+                                                               : "the device was lost";
   } else if (new_frames_ == 0) {
     level = ros2::Level::stale;
+    mode = HealthMode::stale;
     message_ = fmt::format("no frame for {:.1f} s", seconds);
+  } else if (mode == HealthMode::fallback) {
+    level = ros2::Level::warn;
+    message_ = fmt::format("{}: {}", text_of(mode), engine_.reason);
   } else if (new_overflows_ > 0) {
     level = ros2::Level::warn;
+    mode = HealthMode::overflow;
     message_ = fmt::format("{} frames held more than there is room for", new_overflows_);
   } else if (new_missed_ > 0) {
     level = ros2::Level::warn;
@@ -67,7 +76,12 @@ const ros2::DiagnosticArray& RosHealth::report(std::int64_t stamp_ns, double sec
                    {"frames_per_second", fmt::format("{:.1f}", rate)},
                    {"frames_dropped", fmt::to_string(missed_)},
                    {"frames_not_published", fmt::to_string(beside.unpublished)},
-                   {"messages_not_sent", fmt::to_string(beside.unsent)}};
+                   {"messages_not_sent", fmt::to_string(beside.unsent)},
+                   {"mode", name_of(mode)},
+                   {"valid", mode < HealthMode::stale ? "true" : "false"},
+                   {"known_answers", fmt::to_string(engine_.known_answers)},
+                   {"wrong_answers", fmt::to_string(engine_.wrong_answers)},
+                   {"memory_alterations", fmt::to_string(engine_.alterations)}};
   if (latencies_.count() > 0) {
     status.values.push_back({"latency_p50_ms", ms(0.5)});
     status.values.push_back({"latency_p99_ms", ms(0.99)});

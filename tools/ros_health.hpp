@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "berth/frame.hpp"
+#include "berth/health.hpp"
 #include "berth/latency.hpp"
 #include "ros2/messages.hpp"
 
@@ -24,7 +25,7 @@ class RosHealth {
   explicit RosHealth(std::string backend) : backend_(std::move(backend)) {}
 
   /// `latency_ns` below 0 where it is not known.
-  void add(const FrameResult& result, std::int64_t latency_ns);
+  void add(const FrameResult& result, const HealthReport& engine, std::int64_t latency_ns);
   /// The report of the time since the one before. Valid until the next.
   const ros2::DiagnosticArray& report(std::int64_t stamp_ns, double seconds, const Beside& beside);
 
@@ -36,6 +37,7 @@ class RosHealth {
   std::uint64_t next_sequence_ = 0;
   /// Since the last report.
   std::uint64_t new_frames_ = 0, new_missed_ = 0, new_overflows_ = 0;
+  HealthReport engine_;
   bool lost_device_ = false;
   LatencyHistogram latencies_;
 };

@@ -102,6 +102,7 @@ void RosPublisher::observe(const ObservedFrame& frame) {
     item.stamp_ns = stamp_ns;
     item.latency_ns = frame.paced != nullptr ? frame.paced->laps_ns[static_cast<std::size_t>(Lap::latency)] : -1;
     item.result = frame.result;
+    item.engine = frame.engine;
     item.camera = frame.camera;
   });
   if (!taken) ++unpublished_;
@@ -139,7 +140,7 @@ void RosPublisher::publish(const Item& item) {
   const CpuTimer timer(results_.cpu_ns);
   const ros2::Header header = {item.stamp_ns, plan_.camera_frame};
   const FrameResult& result = item.result;
-  health_->add(result, item.latency_ns);
+  health_->add(result, item.engine, item.latency_ns);
   const RosDock::Seen dock = dock_->in(result);
   if (dock.pose != nullptr) send(RosTopic::dock_pose, ros2::PoseStamped{header, *dock.pose}, results_);
   if (dock.covariance != nullptr) {

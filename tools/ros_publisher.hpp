@@ -36,6 +36,7 @@ class RosPublisher final : public FrameObserver {
   struct Item {
     std::int64_t stamp_ns = 0, latency_ns = -1;
     FrameResult result;
+    HealthReport engine;
     std::optional<CameraModel> camera;
   };
   struct ImageItem {

@@ -12,11 +12,12 @@
 #include "berth/error.hpp"
 #include "bundle_show.hpp"
 #include "camera_play.hpp"
+#include "frame/result_digest.hpp"
 #include "frame_json.hpp"
+#include "health_show.hpp"
 #include "interrupt.hpp"
 #include "live_view.hpp"
 #include "marker_filters.hpp"
-#include "result_digest.hpp"
 #include "source_arguments.hpp"
 #include "stream_summary.hpp"
 #include "systematic_show.hpp"
@@ -75,8 +76,7 @@ class StreamRun {
     make_engine(frames.front());
     refuse_poses(stream_frame(frames.front()));
     const DetectorConfig config = engine_->config_for(first.width(), first.height());
-    PacedPlay paced(std::move(frames), options_.pace, engine_->backends(),
-                    make_pipeline_config(options_.pace, config, tracking()));
+    PacedPlay paced(std::move(frames), options_.pace, engine_->backends(), pipeline_config(config));
     paced.describe(people_);
     people_.flush();
     playing_ = &paced;
@@ -101,8 +101,7 @@ class StreamRun {
     make_engine(like);
     refuse_poses(stream_frame(like));
     const DetectorConfig config = engine_->config_for(camera->width(), camera->height());
-    CameraPlay live(*camera, options_.pace, engine_->backends(),
-                    make_pipeline_config(options_.pace, config, tracking()), options_.max_frames);
+    CameraPlay live(*camera, options_.pace, engine_->backends(), pipeline_config(config), options_.max_frames);
     live.describe(people_);
     people_.flush();
     playing_ = &live;
@@ -124,7 +123,8 @@ class StreamRun {
 
   void gather_paced(const StreamFrame& source, const PipelineFrame& frame, bool first_round) {
     if (frame.backend != paced_backend_) {
-      console_.note(source.label + ": the device was lost; the frame was run again on " +
+      console_.note(source.label + ": " + engine_->backends()[paced_backend_]->name() +
+                    " was left: " + playing_->engine().reason + "; the frame was run again on " +
                     engine_->backends()[frame.backend]->name());
       paced_backend_ = frame.backend;
     }
@@ -141,6 +141,21 @@ class StreamRun {
     const std::optional<std::size_t> total = source_.size();
     if (options_.max_frames == 0) return total;
     return std::min<std::size_t>(options_.max_frames, total.value_or(options_.max_frames));
+  }
+
+  std::optional<HealthConfig> health() const {
+    if (options_.known_answer_s == 0) return std::nullopt;
+    HealthConfig health;
+    health.known_answer_every_ns = std::llround(options_.known_answer_s * 1e9);
+    return health;
+  }
+
+  HealthReport engine_health() const { return playing_ != nullptr ? playing_->engine() : engine_->health(); }
+
+  PipelineConfig pipeline_config(const DetectorConfig& detector) const {
+    PipelineConfig config = make_pipeline_config(options_.pace, detector, tracking());
+    config.health = health();
+    return config;
   }
 
   std::optional<TrackerConfig> tracking() const {
@@ -168,7 +183,8 @@ class StreamRun {
     if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
     if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking());
+    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking(),
+                    health());
     const std::string backend = engine_->describe();
     people_ << "backend " << backend << '\n';
     const DetectorConfig sized = engine_->config_for(frame.image.width(), frame.image.height());
@@ -197,6 +213,7 @@ class StreamRun {
                                  backend.name(),
                                  paced != nullptr ? 0 : frame_ns_,
                                  playing_ != nullptr ? playing_->health() : source_.health(),
+                                 engine_health(),
                                  options_.filter ? &filters_ : nullptr,
                                  playing_ != nullptr ? &counts : nullptr};
     for (const auto& observer : options_.observers) observer->observe(observed);
@@ -214,8 +231,8 @@ class StreamRun {
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
     FrameResult result = timed.frame;
     if (&engine_->backend() != before) {
-      console_.note(frame.label + ": " + before->name() + " lost its device; the frame was run again on " +
-                    engine_->describe());
+      console_.note(frame.label + ": " + before->name() + " was left: " + engine_->health().reason +
+                    "; the frame was run again on " + engine_->describe());
     }
     if (timed.difference) report_difference(frame.label, *timed.difference);
     tracked_ = timed.tracked;
@@ -250,6 +267,9 @@ class StreamRun {
       Json line = to_json(result, frame.label, cpu_ns, frame.truth);
       for (std::size_t i = 0; i < systematic_.size(); ++i) add_systematic(systematic_[i], line["detections"][i]);
       if (paced != nullptr) add_times(*paced, line);
+      if (const HealthReport engine = engine_health(); engine.mode != HealthMode::nominal) {
+        line["health"] = name_of(engine.mode);
+      }
       const std::vector<Bundle>& bundles = engine_->config().bundles;
       if (!bundles.empty()) line["bundles"] = to_json(result.bundles, bundles);
       const std::vector<DiscTarget>& targets = engine_->config().disc_targets;
@@ -262,7 +282,11 @@ class StreamRun {
     // A camera's reader has no time to write what nobody can read.
     if (paced == nullptr || summary_.frames() % kShowEvery == 0) show(result, frame.truth);
     if (result.status == FrameStatus::device_lost) {
-      throw Error(frame.label + ": the device was lost; see berth doctor, or use --backend simd");
+      const HealthReport engine = engine_health();
+      const bool is_lost = engine.wrong_answers + engine.alterations == 0;
+      throw Error(frame.label + ": " + (is_lost ? "the device was lost" : "no backend is left that can be believed (") +
+                  (is_lost ? "" : engine.reason + std::string(")")) + "; see berth doctor, or use --backend simd" +
+                  (is_lost ? "" : " and a --fallback"));
     }
   }
 
@@ -379,6 +403,9 @@ class StreamRun {
     if (paced != nullptr) {
       paced->sum_up(people_);
       if (!options_.log.empty()) log() << to_line(paced->summary()) << '\n';
+    }
+    if (paced != nullptr || engine_) {
+      print_health(people_, paced != nullptr ? paced->engine() : engine_->health());
     }
     summary_.print_rest(people_, source_.health());
     if (!options_.log.empty() && options_.log != "-") {

@@ -37,6 +37,7 @@ struct WebStatus {
   bool is_paced = false;
   PipelineCounts counts;
   SourceHealth health;
+  HealthReport engine;
 };
 
 /// One picture of the video with what is drawn on it, encoded once for all who watch.

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "health_show.hpp"
 
 namespace berth::cli {
 namespace {
@@ -55,6 +58,13 @@ Json to_json(const WebStatus& status, double now_s, bool ended) {
   json["why"] = status.is_tracked ? Json(name_of(status.why)) : Json();
   json["backend"] = status.backend;
   json["overflows"] = status.overflows;
+  const bool is_stale = !ended && now_s - status.finished_s > kStaleAfterS;
+  const HealthMode mode =
+      std::max(mode_of(status.engine, status.status), is_stale ? HealthMode::stale : HealthMode::nominal);
+  json["health"] = to_json(status.engine);
+  json["health"]["mode"] = name_of(mode);
+  json["health"]["text"] = text_of(mode);
+  json["valid"] = mode < HealthMode::stale;
   json["camera"] = {{"lost", status.health.lost},
                     {"incomplete", status.health.incomplete},
                     {"skipped", status.health.skipped},

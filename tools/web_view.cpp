@@ -130,6 +130,7 @@ class WebView final : public FrameObserver {
     status_.is_paced = frame.counts != nullptr;
     if (frame.counts != nullptr) status_.counts = *frame.counts;
     status_.health = frame.health;
+    status_.engine = frame.engine;
     if (status_.frames > 1 && now_s - rated_s_ < 1) return;
     if (status_.frames > 1)
       status_.frames_per_second = static_cast<double>(status_.frames - rated_frames_) / (now_s - rated_s_);

@@ -117,6 +117,16 @@ struct Call {
 
 class HostPlan final : public Plan {
  public:
+  void list_constants(std::vector<ConstantMemory>& to) const override {
+    add_constants("launch list", calls, to);
+    for (const Call& call : calls) {
+      add_constants("kernel parameters", call.params, to);
+      // The last one is the stream's memory where an operation works in that, and written at every replay.
+      const std::size_t count = call.buffers.size() - (call.op.workspace ? 1 : 0);
+      if (count > 0) to.push_back({"launch list", call.buffers.data(), count * sizeof(void*)});
+    }
+  }
+
   std::vector<Call> calls;
 };
 

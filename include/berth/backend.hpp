@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "berth/constant_memory.hpp"
 #include "berth/ops.hpp"
 #include "berth/types.hpp"
 
@@ -46,6 +47,8 @@ Step make_step(Op op, const void* params, std::initializer_list<Buffer*> buffers
 class Plan {
  public:
   virtual ~Plan() = default;
+  /// Adds what the host's memory holds of it and no replay writes; where a driver keeps it, nothing.
+  virtual void list_constants(std::vector<ConstantMemory>&) const {}
 };
 
 /// When something enqueued is done, and when the device worked on it.

@@ -108,6 +108,8 @@ class Detector {
 
   /// Bytes of device memory, all taken at start.
   std::size_t device_bytes() const;
+  /// Adds what no frame writes: configuration, codes, launches, a flat field where the host reaches it.
+  void list_constants(std::vector<ConstantMemory>& to) const;
 
  private:
   friend std::optional<StageDifference> first_difference(Detector& first, Detector& second);

@@ -11,6 +11,7 @@ namespace berth {
 
 /// The first word that two backends wrote differently for one frame.
 struct StageDifference {
+  /// "result" where all stages agree, and what the host made of them does not: a digest of it.
   std::string stage;
   /// Where in the stage's output; the length of the shorter one where that is all they differ in.
   std::size_t word = 0;
@@ -38,6 +39,8 @@ class Lockstep {
   const std::optional<StageDifference>& difference() const;
   /// Whether either backend has lost its device: from then on nothing is compared.
   bool device_lost() const;
+  /// The first backend's detector.
+  const Detector& first() const;
 
  private:
   struct Impl;

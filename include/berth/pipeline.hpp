@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "berth/detector.hpp"
+#include "berth/health.hpp"
 #include "berth/latency.hpp"
 #include "berth/tracker.hpp"
 
@@ -37,6 +38,10 @@ struct PipelineConfig {
   std::vector<int> cores;
   /// SCHED_FIFO priority of both threads, 1 to 99; 0 for the usual scheduling.
   int realtime_priority = 0;
+  /// With it the host's thread checks memory before each frame, and now and then runs the picture whose answer is known
+  /// in a frame's place on its slot, before that frame's result goes out: what a backend that fails made of it, nobody
+  /// gets, and it is run again on the next. Meanwhile frames wait, or are dropped and counted.
+  std::optional<HealthConfig> health;
 };
 
 /// The parts of a frame's way, timed.
@@ -151,6 +156,7 @@ class Pipeline {
   PipelineCounts counts() const;
   const LatencyHistogram& times(Lap lap) const;
   PipelineMemory memory() const;
+  HealthReport health() const;
 
  private:
   struct Impl;

@@ -298,6 +298,16 @@ void HostFinish::reserve(const DeviceFrame& frame, FrameResult& result, std::siz
   impl_->reserve(frame, result, most);
 }
 void HostFinish::finish(DeviceFrame& frame, FrameResult& result) { impl_->finish(frame, result); }
+void HostFinish::list_constants(std::vector<ConstantMemory>& to) const {
+  to.push_back({"configuration", &impl_->config, sizeof impl_->config});
+  for (const Bundle& bundle : impl_->config.bundles) add_constants("bundle", bundle.markers, to);
+  for (const MarkerFamily* family : impl_->families) {
+    add_constants("family", family->codes, to);
+    add_constants("family", family->bit_x, to);
+    add_constants("family", family->bit_y, to);
+  }
+  impl_->decoder.list_constants(to);
+}
 void HostFinish::give_up(FrameResult& result) {
   Impl::clear(result);
   result.status = FrameStatus::device_lost;
@@ -361,6 +371,11 @@ const FrameResult& Detector::detect(View2D<const u8> image, const FrameStamp& st
   return collect();
 }
 std::size_t Detector::device_bytes() const { return impl_->device.device_bytes(); }
+
+void Detector::list_constants(std::vector<ConstantMemory>& to) const {
+  impl_->device.list_constants(to);
+  impl_->host.list_constants(to);
+}
 
 std::optional<StageDifference> first_difference(Detector& first, Detector& second) {
   DeviceFrame& one = first.impl_->device;

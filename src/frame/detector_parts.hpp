@@ -53,6 +53,8 @@ class DeviceFrame {
   Stream& stream() { return *stream_; }
   std::size_t device_bytes() const;
   std::size_t host_bytes() const;
+  /// Adds what no frame writes, as far as the host reaches it.
+  void list_constants(std::vector<ConstantMemory>& to) const;
 
  private:
   bool warm_up();
@@ -85,6 +87,8 @@ class HostFinish {
   void reserve(const DeviceFrame& frame, FrameResult& result, std::size_t most);
   /// Makes the result of a frame that has arrived, its stamp left alone.
   void finish(DeviceFrame& frame, FrameResult& result);
+  /// Adds the configuration and the tables that codes are found by.
+  void list_constants(std::vector<ConstantMemory>& to) const;
   /// The result of a frame whose device was lost.
   static void give_up(FrameResult& result);
 

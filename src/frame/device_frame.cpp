@@ -151,6 +151,11 @@ std::size_t DeviceFrame::device_bytes() const {
   return bytes;
 }
 
+void DeviceFrame::list_constants(std::vector<ConstantMemory>& to) const {
+  whole_.plan.list_constants(to);
+  for (const auto& window : windows_) window->plan.list_constants(to);
+}
+
 std::size_t DeviceFrame::host_bytes() const {
   std::size_t bytes = whole_.host_bytes();
   for (const auto& window : windows_) bytes += window->host_bytes();

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "frame/result_digest.hpp"
 #include "frame/stages.hpp"
 
 namespace berth {
@@ -12,6 +13,19 @@ std::string hex(const std::optional<u32>& word) {
   char text[16];
   std::snprintf(text, sizeof text, "0x%08x", *word);
   return text;
+}
+
+/// As of a stage of one digest.
+std::optional<StageDifference> result_difference(u64 first, u64 second) {
+  if (first == second) return std::nullopt;
+  const bool in_low = static_cast<u32>(first) != static_cast<u32>(second);
+  const int shift = in_low ? 0 : 32;
+  StageDifference difference;
+  difference.stage = "result";
+  difference.word = in_low ? 0 : 1;
+  difference.first = static_cast<u32>(first >> shift);
+  difference.second = static_cast<u32>(second >> shift);
+  return difference;
 }
 
 }  // namespace
@@ -49,11 +63,14 @@ const FrameResult& Lockstep::detect(View2D<const u8> image, const FrameStamp& st
     impl_->lost = true;
   } else {
     impl_->difference = first_difference(impl_->first, impl_->second);
+    // The host's part has tables of its own; and it reads the image, which is no stage.
+    if (!impl_->difference) impl_->difference = result_difference(digest_of(first), digest_of(second));
   }
   return first_lost ? second : first;
 }
 
 const std::optional<StageDifference>& Lockstep::difference() const { return impl_->difference; }
 bool Lockstep::device_lost() const { return impl_->lost; }
+const Detector& Lockstep::first() const { return impl_->first; }
 
 }  // namespace berth

@@ -126,6 +126,7 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
   if (is_window_) {
     gains_ = buffer;
   } else {
+    flat_field_ = buffer;
     const std::vector<u32> packed = pack_gains(gains, g);
     upload_at_start(backend_, *backend_.make_stream(), *buffer, packed.data(), packed.size() * 4);
   }
@@ -134,6 +135,13 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
   steps_.push_back(make_step(flat_field_params{words}, {frame_, buffer, pixels}, words));
   stages_.push_back({"flat_field", 0, pixels, Stage::Length::whole});
   return pixels;
+}
+
+void MarkerPlan::list_constants(std::vector<ConstantMemory>& to) const {
+  plan_->list_constants(to);
+  if (flat_field_ != nullptr && flat_field_->host() != nullptr) {
+    to.push_back({"flat field", flat_field_->host(), flat_field_->bytes()});
+  }
 }
 
 Buffer* MarkerPlan::add_halve(Buffer* pixels) {

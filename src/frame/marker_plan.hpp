@@ -98,6 +98,9 @@ class MarkerPlan {
   /// Where a window's gains go, or null: u16 q12[padded_height, padded_width].
   Buffer* gains() { return gains_; }
 
+  /// Adds what no frame writes, as far as the host reaches it.
+  void list_constants(std::vector<ConstantMemory>& to) const;
+
   /// Outputs in order of computation.
   const std::vector<Stage>& stages() const { return stages_; }
   /// Without what it shares.
@@ -130,6 +133,7 @@ class MarkerPlan {
   ScratchBuffers* scratch_;  // while it is made
   Buffer* frame_ = nullptr;
   Buffer* gains_ = nullptr;
+  Buffer* flat_field_ = nullptr;  // gains that stay
   std::array<Buffer*, 2> levels_ = {};
   std::vector<Step> steps_;
   std::vector<Stage> stages_;

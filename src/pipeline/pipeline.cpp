@@ -13,6 +13,7 @@
 
 #include "berth/error.hpp"
 #include "frame/detector_parts.hpp"
+#include "health/health_watch.hpp"
 #include "monotonic.hpp"
 #include "pipeline/slot_ring.hpp"
 #include "pipeline/thread_setup.hpp"
@@ -69,7 +70,7 @@ struct Slot {
   /// With a tracker: where it is to be searched, and where it was.
   SearchOrder order;
   TrackedFrame tracked;
-  std::int64_t arrived_ns = 0, taken_ns = 0;
+  std::int64_t arrived_ns = 0, taken_ns = 0, submitted_ns = 0, done_ns = 0;
   PipelineFrame frame;
 
   DeviceFrame& device() { return *devices[on]; }
@@ -89,7 +90,8 @@ struct Pipeline::Impl {
   Impl(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& wanted, Deliver callback)
       : config(checked(wanted, width, height)),
         deliver(std::move(callback)),
-        ring(config.slots, config.overrun, config.tracking ? config.tracking->behind : 0) {
+        ring(config.slots, config.overrun, config.tracking ? config.tracking->behind : 0),
+        watch(config.health, width, height, config.detector, backends.size()) {
     if (backends.empty()) throw Error("a pipeline needs a backend; give at least one");
     if (config.tracking) tracker.emplace(width, height, *config.tracking);
     slots.resize(static_cast<std::size_t>(config.slots));
@@ -99,8 +101,10 @@ struct Pipeline::Impl {
         slot.devices.push_back(
             std::make_unique<DeviceFrame>(*backend, width, height, config.detector, config.detector.digests));
       }
-      if (i == 0) host = std::make_unique<HostFinish>(width, height, config.detector);
-      host->reserve(slot.device(), slot.result, most_in_frame(slot.device(), width, height));
+      if (i == 0) make_hosts(width, height, backends.size());
+      for (const auto& host : hosts) {
+        host->reserve(slot.device(), slot.result, most_in_frame(slot.device(), width, height));
+      }
       slot.frame.result = &slot.result;
       slot.frame.slot = static_cast<int>(i);
       if (!tracker) continue;
@@ -109,6 +113,7 @@ struct Pipeline::Impl {
       slot.tracked.result = &slot.result;
       slot.frame.tracked = &slot.tracked;
     }
+    if (watch.is_on()) begin_watch();
     ring.close();  // until start: a frame that nobody takes would stand in no count
   }
 
@@ -118,6 +123,58 @@ struct Pipeline::Impl {
     if (!config.tracking) return device.most_in_frame();
     return device.most_in_frame(config.tracking->most_windows, config.tracking->most_share * width * height);
   }
+
+  /// Each backend has tables of its own where they are watched, so that one may be left for what happened to them.
+  void make_hosts(int width, int height, std::size_t backends) {
+    for (std::size_t i = 0; i < (watch.is_on() ? backends : 1); ++i) {
+      hosts.push_back(std::make_unique<HostFinish>(width, height, config.detector));
+    }
+  }
+
+  HostFinish& host_on(std::size_t backend) { return *hosts[std::min(backend, hosts.size() - 1)]; }
+
+  /// Every slot is asked at start, on every backend.
+  void begin_watch() {
+    DeviceFrame& first = slots.front().device();
+    host_on(0).reserve(first, known_result, first.most_in_frame());
+    kept_pixels.resize(first.geometry().frame_bytes());
+    for (std::size_t b = 0; b < hosts.size(); ++b) {
+      std::vector<ConstantMemory> memory;
+      hosts[b]->list_constants(memory);
+      for (Slot& slot : slots) {
+        slot.devices[b]->list_constants(memory);
+        ask(slot, b);
+      }
+      watch.watch(memory, static_cast<int>(b));
+    }
+  }
+
+  /// Runs the picture whose answer is known, over what the slot holds.
+  bool ask(Slot& slot, std::size_t backend) {
+    DeviceFrame& device = *slot.devices[backend];
+    pad_frame(watch.picture(), device.geometry(), device.pixels());
+    device.submit();
+    if (device.finish()) {
+      host_on(backend).finish(device, known_result);
+    } else {
+      HostFinish::give_up(known_result);
+    }
+    return watch.answer(backend, known_result, monotonic_ns());
+  }
+
+  /// The same where it is due, or the backend has just taken over; the slot's frame stays.
+  bool is_believed(Slot& slot) {
+    if (!watch.is_on() || (asked == slot.on && !watch.is_due(monotonic_ns()))) return true;
+    asked = slot.on;
+    u8* const pixels = slot.device().pixels();
+    std::memcpy(kept_pixels.data(), pixels, kept_pixels.size());
+    const bool is_right = ask(slot, slot.on);
+    std::memcpy(pixels, kept_pixels.data(), kept_pixels.size());
+    return is_right;
+  }
+
+  /// Which backend frames are run on; the last where none is left.
+  std::size_t active() const { return std::min(watch.active(), slots.front().devices.size() - 1); }
 
   Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
 
@@ -180,7 +237,7 @@ struct Pipeline::Impl {
   }
 
   void submit(Slot& slot, bool again) {
-    const std::size_t to = active.load(std::memory_order_acquire);
+    const std::size_t to = active();
     if (slot.on != to) {
       DeviceFrame& next = *slot.devices[to];
       pad_frame(slot.device().image(), next.geometry(), next.pixels());
@@ -237,16 +294,21 @@ struct Pipeline::Impl {
   /// Waits for the frame and makes its result, unless enqueueing it has thrown. Returns when the host took it up.
   std::int64_t make_result(int i) {
     Slot& slot = at(i);
-    const bool alive = wait_for_device(i);
-    const std::int64_t began_ns = monotonic_ns();
-    if (!slot.submitted) return began_ns;
-    ring.on_host();
-    if (alive) {
-      host->finish(slot.device(), slot.result);
-    } else {
-      HostFinish::give_up(slot.result);
+    watch.scrub();
+    for (;;) {
+      const bool alive = wait_for_device(i);
+      const std::int64_t began_ns = monotonic_ns();
+      if (!slot.submitted) return began_ns;
+      ring.on_host();
+      slot.submitted_ns = slot.device().submitted_ns();
+      slot.done_ns = slot.device().done_ns();
+      if (!alive) {
+        HostFinish::give_up(slot.result);
+        return began_ns;
+      }
+      host_on(slot.on).finish(slot.device(), slot.result);
+      if (is_believed(slot)) return began_ns;
     }
-    return began_ns;
   }
 
   /// Within a catch, on either thread: the first error is the one that stop throws. What is under way is dropped.
@@ -256,15 +318,15 @@ struct Pipeline::Impl {
     ring.discard();
   }
 
-  /// Waits for the frame; one whose device was lost runs again on the next backend, as all after it do.
+  /// Waits for the frame; one whose device was lost, or is not believed any more, runs again on the next backend, as
+  /// all after it do.
   bool wait_for_device(int i) {
     Slot& slot = at(i);
-    while (slot.submitted && !slot.device().finish()) {
-      const std::size_t now = active.load(std::memory_order_relaxed);
-      if (slot.on == now) {
-        if (now + 1 == slot.devices.size()) return false;
-        active.store(now + 1, std::memory_order_release);
-      }
+    while (slot.submitted) {
+      const bool alive = slot.device().finish();
+      if (alive && watch.is_good(slot.on)) return true;
+      if (!alive) watch.lose(slot.on);
+      if (watch.has_failed()) return false;
       count_one(run_again);
       ring.run_again(i);
     }
@@ -278,8 +340,8 @@ struct Pipeline::Impl {
     ns.fill(0);
     const auto lap = [&ns](Lap which) -> std::int64_t& { return ns[static_cast<std::size_t>(which)]; };
     lap(Lap::wait) = slot.taken_ns - slot.arrived_ns;
-    lap(Lap::device) = device.done_ns() - device.submitted_ns();
-    lap(Lap::queue) = began_ns - device.done_ns();
+    lap(Lap::device) = slot.done_ns - slot.submitted_ns;
+    lap(Lap::queue) = began_ns - slot.done_ns;
     if (slot.result.status != FrameStatus::device_lost) {
       lap(Lap::decode) = slot.result.times[1].ns;
       lap(Lap::pose) = slot.result.times[2].ns + slot.result.times[4].ns;
@@ -304,12 +366,16 @@ struct Pipeline::Impl {
   const PipelineConfig config;
   const Deliver deliver;
   std::vector<Slot> slots;
-  std::unique_ptr<HostFinish> host;
+  std::vector<std::unique_ptr<HostFinish>> hosts;
   /// The device's thread asks it for windows, the host's thread gives it results; the ring keeps them apart.
   std::optional<Tracker> tracker;
   SlotRing ring;
-  /// Which backend frames are run on; only the host's thread, which sees a loss, moves it.
-  std::atomic<std::size_t> active = 0;
+  /// Which backends can be believed; only the host's thread, which sees a loss, changes that.
+  HealthWatch watch;
+  /// The host's thread's: of the known picture, and which backend was asked last.
+  FrameResult known_result;
+  std::vector<u8> kept_pixels;
+  std::size_t asked = 0;
   std::atomic<u64> run_again = 0, device_lost = 0;
   std::array<std::atomic<u64>, 2> late = {};
   std::array<LatencyHistogram, kLaps> laps;
@@ -346,7 +412,7 @@ FrameSlot Pipeline::begin() {
   impl_->filling = impl_->ring.begin();
   if (impl_->filling < 0) return {};
   Slot& slot = impl_->at(impl_->filling);
-  slot.on = impl_->active.load(std::memory_order_acquire);
+  slot.on = impl_->active();
   const MarkerGeometry& g = slot.device().geometry();
   return {{slot.device().pixels(), g.width, g.height, g.padded_width}, impl_->filling};
 }
@@ -388,11 +454,13 @@ PipelineCounts Pipeline::counts() const {
 
 const LatencyHistogram& Pipeline::times(Lap lap) const { return impl_->laps[static_cast<std::size_t>(lap)]; }
 
+HealthReport Pipeline::health() const { return impl_->watch.report(); }
+
 PipelineMemory Pipeline::memory() const {
   PipelineMemory memory;
   memory.slots = impl_->config.slots;
   memory.frame_bytes = impl_->slots.front().devices.front()->geometry().frame_bytes();
-  memory.host_bytes = sizeof(Impl);
+  memory.host_bytes = sizeof(Impl) + impl_->kept_pixels.size();
   for (const Slot& slot : impl_->slots) {
     for (const std::unique_ptr<DeviceFrame>& device : slot.devices) {
       memory.device_bytes += device->device_bytes();

@@ -64,4 +64,13 @@ CodeBook::Match CodeBook::find(u64 word) const {
   return best;
 }
 
+void CodeBook::list_constants(std::vector<ConstantMemory>& to) const {
+  add_constants("code book", words_, to);
+  add_constants("code book", chunks_, to);
+  for (const Chunk& chunk : chunks_) {
+    add_constants("code book", chunk.first, to);
+    add_constants("code book", chunk.entries, to);
+  }
+}
+
 }  // namespace berth

@@ -26,6 +26,7 @@ class CodeBook {
 
   /// The nearest code within max_hamming, the first in the table of equally near ones; entry -1 if there is none.
   Match find(u64 word) const;
+  void list_constants(std::vector<ConstantMemory>& to) const;
 
  private:
   struct Chunk {

@@ -151,4 +151,13 @@ bool Decoder::decode(View2D<const u8> image, const QuadCandidate& quad, Detectio
   return false;
 }
 
+void Decoder::list_constants(std::vector<ConstantMemory>& to) const {
+  add_constants("decoder", impl_->groups, to);
+  for (const Group& group : impl_->groups) {
+    group.layout.list_constants(to);
+    add_constants("decoder", group.matchers, to);
+    for (const CodeMatcher& matcher : group.matchers) matcher.book().list_constants(to);
+  }
+}
+
 }  // namespace berth

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "berth/constant_memory.hpp"
 #include "berth/image.hpp"
 #include "berth/marker.hpp"
 #include "target/side_covariance.hpp"
@@ -36,6 +37,8 @@ class Decoder {
   /// Tries the fine corners, then the coarse ones. Returns whether a code of a family was read into `detection`,
   /// whose corners are then the fine ones in the paper's order. Allocates nothing.
   bool decode(View2D<const u8> image, const QuadCandidate& quad, Detection& detection) const;
+  /// Adds its tables.
+  void list_constants(std::vector<ConstantMemory>& to) const;
 
  private:
   struct Impl;

@@ -83,4 +83,13 @@ int Layout::cell_at(int column, int row) const {
   return -1;
 }
 
+void Layout::list_constants(std::vector<ConstantMemory>& to) const {
+  for (const std::vector<int>* cells : {&x, &y, &neighbours}) add_constants("layout", *cells, to);
+  for (const RingPoints* points : {&ring, &probe}) {
+    add_constants("layout", points->u, to);
+    add_constants("layout", points->v, to);
+    add_constants("layout", points->light, to);
+  }
+}
+
 }  // namespace berth

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "berth/constant_memory.hpp"
 #include "berth/marker.hpp"
 
 namespace berth {
@@ -31,6 +32,8 @@ struct Layout {
   bool fits(const MarkerFamily& family) const;
   /// The cell at a place; -1 where there is none.
   int cell_at(int column, int row) const;
+
+  void list_constants(std::vector<ConstantMemory>& to) const;
 
   int border_width = 0;
   bool reversed_border = false;

@@ -1,10 +1,6 @@
 #include "support/faulty_backend.hpp"
 
-#include <atomic>
 #include <utility>
-#include <vector>
-
-#include "support/forwarding_backend.hpp"
 
 namespace berth::test {
 namespace {
@@ -13,7 +9,11 @@ namespace {
 struct FaultyPlan final : Plan {
   std::vector<Step> steps;
   std::vector<std::unique_ptr<Plan>> plans;
-  int replays = 0;
+  int replays = -1;  // the first is the empty frame that every DeviceFrame begins with
+  int epoch = 0;
+  void list_constants(std::vector<ConstantMemory>& to) const override {
+    for (const auto& plan : plans) plan->list_constants(to);
+  }
 };
 
 class FaultyEvent final : public Event {
@@ -28,17 +28,23 @@ class FaultyEvent final : public Event {
 
 class FaultyStream final : public ForwardingStream {
  public:
-  FaultyStream(std::unique_ptr<Stream> behind, const Fault& fault, std::atomic<bool>& lost)
-      : ForwardingStream(std::move(behind)), fault_(fault), lost_(lost) {}
+  FaultyStream(std::unique_ptr<Stream> behind, const Fault& fault, const int& epoch, std::atomic<bool>& lost)
+      : ForwardingStream(std::move(behind)), fault_(fault), epoch_(epoch), lost_(lost) {}
 
   void replay(Plan& plan) override {
     FaultyPlan& faulty = static_cast<FaultyPlan&>(plan);
+    if (faulty.epoch != epoch_) {
+      faulty.epoch = epoch_;
+      faulty.replays = 0;
+    }
     const int frame = faulty.replays++;
     if (fault_.lose_frame >= 0 && frame >= fault_.lose_frame) lost_ = true;
     if (lost_) return;
     for (std::size_t i = 0; i < faulty.plans.size(); ++i) {
+      const bool flips = static_cast<int>(i) == fault_.flip_step && frame == fault_.flip_frame;
+      if (flips && fault_.flip_before) flip(faulty.steps[i]);
       behind().replay(*faulty.plans[i]);
-      if (static_cast<int>(i) == fault_.flip_step && frame == fault_.flip_frame) flip(faulty.steps[i]);
+      if (flips && !fault_.flip_before) flip(faulty.steps[i]);
     }
   }
   std::unique_ptr<Event> record_event() override {
@@ -58,32 +64,32 @@ class FaultyStream final : public ForwardingStream {
   }
 
   const Fault& fault_;
+  const int& epoch_;
   std::atomic<bool>& lost_;
-};
-
-class FaultyBackend final : public ForwardingBackend {
- public:
-  FaultyBackend(Backend& behind, const Fault& fault)
-      : ForwardingBackend("faulty", behind,
-                          [this](std::unique_ptr<Stream> stream) {
-                            return std::make_unique<FaultyStream>(std::move(stream), fault_, lost_);
-                          }),
-        fault_(fault) {}
-  std::unique_ptr<Plan> record(const std::vector<Step>& steps) override {
-    auto plan = std::make_unique<FaultyPlan>();
-    plan->steps = steps;
-    for (const Step& step : steps) plan->plans.push_back(behind().record({step}));
-    return plan;
-  }
-
- private:
-  Fault fault_;
-  std::atomic<bool> lost_ = false;  // streams of several threads see it
 };
 
 }  // namespace
 
-std::unique_ptr<Backend> make_faulty_backend(Backend& behind, const Fault& fault) {
+FaultyBackend::FaultyBackend(Backend& behind, const Fault& fault)
+    : ForwardingBackend("faulty", behind,
+                        [this](std::unique_ptr<Stream> stream) {
+                          return std::make_unique<FaultyStream>(std::move(stream), fault_, epoch_, lost_);
+                        }),
+      fault_(fault) {}
+
+std::unique_ptr<Plan> FaultyBackend::record(const std::vector<Step>& steps) {
+  auto plan = std::make_unique<FaultyPlan>();
+  plan->steps = steps;
+  for (const Step& step : steps) plan->plans.push_back(behind().record({step}));
+  return plan;
+}
+
+void FaultyBackend::arm(const Fault& fault) {
+  fault_ = fault;
+  ++epoch_;
+}
+
+std::unique_ptr<FaultyBackend> make_faulty_backend(Backend& behind, const Fault& fault) {
   return std::make_unique<FaultyBackend>(behind, fault);
 }
 

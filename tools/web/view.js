@@ -303,6 +303,8 @@
   function showHealth(s) {
     const lines = [];
     const camera = s.camera, total = camera.lost + camera.incomplete;
+    if (s.health.mode !== 'nominal') lines.push([s.valid ? 'warn' : 'bad', s.health.text + (s.health.reason ? ': ' + s.health.reason : '')]);
+    if (s.health.known_answers) lines.push(['', berth.count(s.health.known_answers) + ' known answers, ' + s.health.wrong_answers + ' wrong']);
     lines.push(s.status === 'device_lost' ? ['bad', 'the device is lost'] : ['', 'device: ' + s.backend]);
     lines.push(total ? ['warn', 'camera: ' + camera.lost + ' lost, ' + camera.incomplete + ' incomplete'] : ['', 'camera: no frame lost']);
     if (camera.reopened) lines.push(['warn', 'camera opened again ' + camera.reopened + ' ×']);

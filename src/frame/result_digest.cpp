@@ -1,11 +1,11 @@
-#include "result_digest.hpp"
+#include "frame/result_digest.hpp"
 
 #include <array>
 #include <cstring>
 
 #include "frame/digest.hpp"
 
-namespace berth::cli {
+namespace berth {
 namespace {
 
 void hash(u64& digest, double value) {
@@ -46,4 +46,4 @@ u64 digest_of(const FrameResult& result) {
   return digest;
 }
 
-}  // namespace berth::cli
+}  // namespace berth

@@ -1,0 +1,83 @@
+#include "health/memory_scrub.hpp"
+
+#ifdef __linux__
+#include <link.h>
+#endif
+
+#include <algorithm>
+
+#include "crc32.hpp"
+
+namespace berth {
+namespace {
+
+constexpr std::size_t kPiece = 4096;
+
+}  // namespace
+
+void MemoryScrub::add(const std::vector<ConstantMemory>& blocks, int owner) {
+  for (const ConstantMemory& block : blocks) {
+    const auto* at = static_cast<const unsigned char*>(block.data);
+    for (std::size_t done = 0; done < block.bytes; done += kPiece) {
+      const std::size_t count = std::min(kPiece, block.bytes - done);
+      pieces_.push_back({at + done, count, crc32(at + done, count), block.what, owner});
+    }
+    bytes_ += block.bytes;
+  }
+}
+
+std::optional<MemoryScrub::Altered> MemoryScrub::check(std::size_t bytes) {
+  std::size_t done = 0;
+  // Once around at most: small blocks must not be checked twice for a large slice.
+  for (std::size_t looked = 0; looked < pieces_.size() && done < bytes; ++looked) {
+    const Piece& piece = pieces_[next_];
+    next_ = next_ + 1 < pieces_.size() ? next_ + 1 : 0;
+    done += piece.bytes;
+    if (crc32(piece.at, piece.bytes) != piece.crc) return Altered{piece.what, piece.owner};
+  }
+  return std::nullopt;
+}
+
+#ifdef __linux__
+
+namespace {
+
+/// Adds the segments that cannot be written of the module this function is in.
+int add_own_segments(dl_phdr_info* info, std::size_t, void* to) {
+  const auto here = reinterpret_cast<ElfW(Addr)>(&add_own_segments);
+  const auto segments = [&](auto&& each) {
+    for (int i = 0; i < info->dlpi_phnum; ++i) {
+      const ElfW(Phdr)& segment = info->dlpi_phdr[i];
+      if (segment.p_type == PT_LOAD) each(segment, info->dlpi_addr + segment.p_vaddr);
+    }
+  };
+  bool is_own = false;
+  segments([&](const ElfW(Phdr) & segment, ElfW(Addr) at) {
+    is_own = is_own || (here >= at && here - at < segment.p_memsz);
+  });
+  if (!is_own) return 0;
+  segments([&](const ElfW(Phdr) & segment, ElfW(Addr) at) {
+    const bool is_readable = (segment.p_flags & PF_R) != 0 && (segment.p_flags & PF_W) == 0;
+    if (!is_readable) return;
+    auto& memory = *static_cast<std::vector<ConstantMemory>*>(to);
+    memory.push_back({(segment.p_flags & PF_X) != 0 ? "program code" : "program tables",
+                      reinterpret_cast<const void*>(at), segment.p_filesz});
+  });
+  return 1;
+}
+
+}  // namespace
+
+std::vector<ConstantMemory> program_memory() {
+  std::vector<ConstantMemory> memory;
+  dl_iterate_phdr(add_own_segments, &memory);
+  return memory;
+}
+
+#else
+
+std::vector<ConstantMemory> program_memory() { return {}; }
+
+#endif
+
+}  // namespace berth
