@@ -82,12 +82,41 @@ TEST(CliBench, DescribesThisMachine) {
               HasSubstr("tx1, jetson-nano"));
 }
 
+TEST(CliChaos, GoesOnWhereItsFileEnds) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "chaos.json";
+  const test::CommandRun first = test::run_berth({"chaos", "--flips", "12", "--json", file});
+  EXPECT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_THAT(first.out, HasSubstr("12 flips on simd, seed 1"));
+  const test::CommandRun second = test::run_berth({"chaos", "--flips", "18", "--json", file});
+  EXPECT_THAT(second.out, HasSubstr("18 flips on simd, seed 1"));
+  const auto json = nlohmann::json::parse(test::text_of(file));
+  EXPECT_EQ(json["flips"], 18);
+  EXPECT_EQ(json["regions"]["image"]["flips"], 18);
+  const test::CommandRun other = test::run_berth({"chaos", "--flips", "18", "--seed", "2", "--json", file});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("another campaign"));
+  folder.write("chaos.json", std::string("{}"));
+  EXPECT_THAT(test::run_berth({"chaos", "--json", file}).err, HasSubstr("no report of berth chaos"));
+}
+
 TEST(CliRun, LockstepComparesEveryFrame) {
   const test::CommandRun run =
       run_berth({"run", "--source", scenario(), "--max-frames", "3", "--lockstep", "simd,cpu"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("in lockstep with cpu on"));
   EXPECT_THAT(run.out, HasSubstr("3 frames, 3 with markers, 0 differing"));
+}
+
+TEST(CliRun, SaysHowTheEngineIs) {
+  const test::CommandRun run =
+      run_berth({"run", "--source", scenario(), "--backend", "simd", "--max-frames", "3", "--known-answer", "60"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("health      nominal: 1 known answer, 0 wrong; "));
+  const test::CommandRun both =
+      run_berth({"run", "--source", scenario(), "--max-frames", "1", "--known-answer", "60", "--lockstep", "simd,cpu"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("--known-answer"));
 }
 
 TEST(CliRun, LockstepAndFallbackNameWhatIsWrong) {

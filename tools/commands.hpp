@@ -8,6 +8,7 @@ namespace berth::cli {
 
 /// Each adds one subcommand, whose callback runs it and leaves its exit code in `exit_code`.
 void add_calibrate(CLI::App& app, Console& console, int& exit_code);
+void add_chaos(CLI::App& app, Console& console, int& exit_code);
 void add_demo(CLI::App& app, Console& console, int& exit_code);
 void add_detect(CLI::App& app, Console& console, int& exit_code);
 void add_flight(CLI::App& app, Console& console, int& exit_code);

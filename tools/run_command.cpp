@@ -62,6 +62,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   });
   int exit_code = kOk;
   add_calibrate(app, console, exit_code);
+  add_chaos(app, console, exit_code);
   add_demo(app, console, exit_code);
   add_detect(app, console, exit_code);
   add_flight(app, console, exit_code);
