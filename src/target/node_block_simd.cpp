@@ -56,6 +56,17 @@ struct Offsets {
 };
 constexpr Offsets kOffsets;
 
+// To each lane the products of its own two entries.
+HWY_INLINE V32 add_pairs(V32 sums, V16 a, V16 b) {
+#if HWY_ARCH_X86
+  return add_products(sums, a, b);  // pmaddwd's order
+#else
+  const auto first = [](V16 v) HWY_ATTR { return hn::ShiftRight<16>(hn::ShiftLeft<16>(hn::BitCast(D32(), v))); };
+  const auto second = [](V16 v) HWY_ATTR { return hn::ShiftRight<16>(hn::BitCast(D32(), v)); };
+  return hn::Add(sums, hn::Add(hn::Mul(first(a), first(b)), hn::Mul(second(a), second(b))));
+#endif
+}
+
 // A coordinate of rows' pixels, those of even and of odd columns in 32-bit lanes.
 struct Coordinates {
   V32 even, odd;
@@ -84,13 +95,13 @@ class Coordinate {
     for (std::size_t odd = 0; odd < 2; ++odd) {
       const V16 columns = hn::LoadDup128(D16(), kOffsets.columns[odd]);
       const V16 linear = hn::LoadDup128(D16(), kOffsets.linear[odd]);
-      start_[odd] = add_products(hn::Set(D32(), q.start), pair(x, xx), columns);
+      start_[odd] = add_pairs(hn::Set(D32(), q.start), pair(x, xx), columns);
       down_[odd] = hn::Add(pair(y, yy), hn::Mul(all(xy), linear));
     }
   }
   HWY_INLINE Coordinates at(int row_step, int row) const {
     const V16 rows = hn::Load(D16(), kOffsets.rows[row_step - 1][row]);
-    return {add_products(start_[0], down_[0], rows), add_products(start_[1], down_[1], rows)};
+    return {add_pairs(start_[0], down_[0], rows), add_pairs(start_[1], down_[1], rows)};
   }
 
  private:

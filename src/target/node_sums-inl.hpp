@@ -28,6 +28,7 @@ constexpr std::size_t kLanes = hn::MaxLanes(D16());
 constexpr std::size_t kVectorRows = kLanes / 8;
 static_assert(kVectorRows == 1 || kVectorRows == 2 || kVectorRows == 4, "of a block's 4 or 8 rows");
 
+// Which products go to which lanes is the processor's choice: it is for sums that end as totals.
 HWY_INLINE V32 add_products(V32 sums, V16 a, V16 b) {
   V32 more = hn::Zero(D32());
   sums = hn::ReorderWidenMulAccumulate(D32(), a, b, sums, more);
