@@ -172,6 +172,7 @@ ObservedFrame RecordedResult::observed(View2D<const u8> image) const {
           backend_.c_str(),
           0,
           {},
+          {},
           nullptr,
           nullptr};
 }
