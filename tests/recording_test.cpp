@@ -58,7 +58,7 @@ struct HandedFrame {
     for (Detection& detection : result.detections) detection.family = &family("tag36h11");
   }
   ObservedFrame observed() {
-    return {label, image.view(), result, 7, Mode::docking, camera, nullptr, nullptr, truth, targets, "simd", 0, {}};
+    return {label, image.view(), result, 7, Mode::docking, camera, nullptr, nullptr, truth, targets, "simd", 0, {}, {}};
   }
   void number(u64 n) {
     result.stamp.sequence = n;
