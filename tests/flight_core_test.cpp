@@ -11,6 +11,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "berth/backend.hpp"
@@ -316,6 +317,46 @@ TEST(FlightCore, SaysWhatIsWrong) {
     EXPECT_THAT(error.message, HasSubstr("stride is 3"));
   }
   EXPECT_GT(berth_core_message_bytes(), 0U);
+}
+
+TEST(FlightCore, KeepsNamesThroughManyErrorsAndLosesNothingByThem) {
+  const std::string name = berth_family_name(0);
+  Settings settings;
+  const std::size_t bytes = needed(settings);
+  static const char* const kUnknown = "a family that nobody has heard of until today";
+  Settings wrong;
+  wrong.core.families = &kUnknown;
+  wrong.core.family_count = 1;
+  Memory memory(bytes);
+  for (int i = 0; i < 5000; ++i) {  // their texts together are more than the tables have room for
+    ASSERT_EQ(berth_core_open(&wrong.core, memory.get(), memory.bytes(), nullptr), nullptr);
+  }
+  EXPECT_EQ(berth_family_name(0), name);
+  const char* const long_name = "tagStandard41h12";
+  settings.core.families = &long_name;
+  settings.core.family_count = 1;
+  Memory enough(needed(settings));
+  EXPECT_NE(open(settings, enough), nullptr);
+}
+
+TEST(FlightCore, OpensOnSeveralThreads) {
+  const Settings settings;
+  const std::size_t bytes = needed(settings);
+  std::vector<std::unique_ptr<Memory>> memories;
+  std::vector<std::thread> threads;
+  std::vector<Handle> detectors(4);
+  for (std::size_t i = 0; i < detectors.size(); ++i) memories.push_back(std::make_unique<Memory>(bytes));
+  for (std::size_t i = 0; i < detectors.size(); ++i) {
+    threads.emplace_back([&, i] { detectors[i] = open(settings, *memories[i]); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  const SourceFrame frame = approach(1).front();
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  Detector expected(*backend, kWidth, kHeight, config_like(settings));
+  for (const Handle& detector : detectors) {
+    ASSERT_EQ(detect(detector.get(), frame), BERTH_OK);
+    EXPECT_GT(expect_same(detector.get(), expected.detect(frame.image.view(), frame.stamp)), 0U);
+  }
 }
 
 TEST(FlightCore, TheExamplePrintsThePose) {

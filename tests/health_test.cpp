@@ -176,6 +176,21 @@ TEST(Failover, GivesNoResultWhereNoBackendIsLeft) {
   EXPECT_EQ(detector.active(), 0u);
 }
 
+TEST(KnownAnswer, IsRightWithDigestsToo) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  DetectorConfig config = posing();
+  config.digests = true;
+  FailoverDetector detector({backend.get()}, kWidth, kHeight, config, always());
+  EXPECT_EQ(detector.detect(picture(0), stamped(0)).status, FrameStatus::ok);
+  EXPECT_EQ(detector.health().mode, HealthMode::nominal);
+  PipelineConfig paced;
+  paced.detector = config;
+  paced.health = always();
+  const Pipeline pipeline({backend.get()}, kWidth, kHeight, paced, [](const PipelineFrame&) {});
+  EXPECT_EQ(pipeline.health().mode, HealthMode::nominal);
+  EXPECT_GT(pipeline.health().known_answers, 0u);
+}
+
 TEST(Pipeline, LosesNoFrameToABackendThatAnswersWrongly) {
   const std::unique_ptr<Backend> simd = open_backend("simd");
   const std::unique_ptr<Backend> cpu = open_backend("cpu");

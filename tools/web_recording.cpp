@@ -255,7 +255,9 @@ class OpenedRun final : public RecordedRun {
     if (!record.is_object()) throw Error(name_of_frame(number) + ": its record is damaged");
     // The frame's own time; by the first frame's, which the first request may come before.
     const std::int64_t at_ns = static_cast<std::int64_t>(message.publish_time);
-    time_s = static_cast<double>(at_ns - first_ns(number, at_ns)) / 1e9;
+    // Both are the file's: they may be anything.
+    const u64 since_first = static_cast<u64>(at_ns) - static_cast<u64>(first_ns(number, at_ns));
+    time_s = static_cast<double>(static_cast<std::int64_t>(since_first)) / 1e9;
     return record;
   }
 
@@ -299,7 +301,7 @@ class OpenedRun final : public RecordedRun {
         const mcap::Bytes& records = open_chunk(frames_[i].chunk, open);
         const Json record = parse_record(message_of(records, frames_[i].record, i), i, time_s);
         result.emplace(record, config_, camera_, about_.backend, name_of_frame(i));
-      } catch (const Error& error) {
+      } catch (const std::exception& error) {  // a damaged file may ask for more memory than there is
         wrong = error.what();
       }
       // A scenario played round begins anew; the page's time does not.

@@ -2,6 +2,7 @@
 
 #include "c_api/edge.hpp"
 #include "c_api/handles.hpp"
+#include "target/family_name.hpp"
 
 using namespace berth;
 using namespace berth::c_api;
@@ -14,8 +15,6 @@ berth_code berth_camera_paper(berth_camera* camera, int32_t width, int32_t heigh
   return guarded(error, [&] { write_camera(paper_camera(width, height), camera); });
 }
 
-const char* berth_family_name(size_t index) {
-  return index < family_names().size() ? family_names()[index].c_str() : nullptr;
-}
+const char* berth_family_name(size_t index) { return family_name_at(index); }
 
 }  // extern "C"

@@ -223,6 +223,7 @@ class GstCamera final : public LiveCamera {
       if (end_.empty()) end_ = end;
       change_.notify_one();
     }
+    gst_message_unref(message);  // what a handler drops is its own
     return GST_BUS_DROP;
   }
 

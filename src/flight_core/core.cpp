@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <mutex>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "berth/ops.hpp"
 #include "berth_core.h"
@@ -21,8 +23,8 @@ using flight_core::Use;
 
 namespace {
 
-/// What is made once and stays: the operations' table, and families when they are first asked for. All that there are
-/// fit in.
+/// What is made once and stays: the operations' table, families' names, and families when they are first asked for. All
+/// that there are fit in.
 constexpr std::size_t kTableBytes = std::size_t{2} << 20;
 alignas(BERTH_CORE_ALIGNMENT) unsigned char table_memory[kTableBytes];
 Region tables(table_memory, kTableBytes);
@@ -30,14 +32,22 @@ Region tables(table_memory, kTableBytes);
 /// Where a detector is measured: more than any takes. Pages that it does not touch are not there.
 constexpr std::size_t kMeasuredBytes = std::size_t{1} << 34;
 
-const MarkerFamily& family_in_tables(const char* name) {
-  const Use use(tables);
-  return family(name);
-}
+std::mutex tables_mutex;
 
-void make_operations_table() {
+void make_tables() {
+  const std::lock_guard<std::mutex> lock(tables_mutex);
   const Use use(tables);
   name_of(Op{});
+  family_names();
+}
+
+/// Nothing but the family itself takes the tables' memory: neither its name nor what is said of one that is unknown.
+const MarkerFamily& family_in_tables(const std::string& name) {
+  const std::vector<std::string>& names = family_names();
+  if (std::find(names.begin(), names.end(), name) == names.end()) return family(name);  // throws
+  const std::lock_guard<std::mutex> lock(tables_mutex);
+  const Use use(tables);
+  return family(name);
 }
 
 Bundle bundle_of(const berth_core_bundle& given) {
@@ -58,7 +68,7 @@ berth_settings settings_of(const berth_core_settings& given) {
   for (std::size_t i = 0; given.families != nullptr && i < given.family_count; ++i) {
     config.families.push_back(&needed(given.families[i], "a family's name"));
   }
-  for (const std::string& name : config.families) family_in_tables(name.c_str());
+  for (const std::string& name : config.families) family_in_tables(name);
   if (given.camera != nullptr) config.camera = camera_of(given.camera);
   config.marker_size_m = given.marker_size_m;
   if (given.bundle_count > 0) needed(given.bundles, "bundles");
@@ -72,7 +82,7 @@ berth_settings settings_of(const berth_core_settings& given) {
 }
 
 berth_detector* open_in(Region& region, const berth_core_settings& given) {
-  make_operations_table();
+  make_tables();
   const Use use(region);
   const berth_settings settings = settings_of(given);
   const berth_backend backend{host::make_host_backend("simd", {"processor", simd_backend::target_name()},

@@ -42,7 +42,7 @@ bool HealthWatch::answer(std::size_t backend, const FrameResult& result, std::in
 void HealthWatch::scrub() {
   if (!is_on() || config_.scrub_bytes == 0) return;
   const std::optional<MemoryScrub::Altered> found = scrub_.check(config_.scrub_bytes);
-  checked_ += std::min(config_.scrub_bytes, scrub_.bytes());
+  checked_ = scrub_.checked();
   if (!found) return;
   ++altered_;
   for (std::size_t i = 0; i < good_.size(); ++i) {

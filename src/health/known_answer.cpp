@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <memory>
 
 #include "berth/backend.hpp"
@@ -71,15 +70,8 @@ void soften(GrayImage& image, u64& random) {
   }
 }
 
-void hash(u64& digest, double value) {
-  std::array<u32, 2> words = {};
-  std::memcpy(words.data(), &value, sizeof value);
-  digest = digest_words(words.data(), words.size(), digest);
-}
-
 DetectorConfig whole_frames(DetectorConfig config) {
   config.window_sides.clear();
-  config.digests = false;
   return config;
 }
 
@@ -126,12 +118,12 @@ u64 KnownAnswer::digest(const FrameResult& result) {
   for (const Detection& d : result.detections) {
     const u32 hamming = static_cast<u32>(d.hamming);
     digest = digest_words(&hamming, 1, digest);
-    hash(digest, d.margin);
+    digest = digest_number(d.margin, digest);
     if (d.corner_covariance_px2) {
-      for (const double value : *d.corner_covariance_px2) hash(digest, value);
+      for (const double value : *d.corner_covariance_px2) digest = digest_number(value, digest);
     }
     if (d.pose_uncertainty) {
-      for (const double value : d.pose_uncertainty->covariance) hash(digest, value);
+      for (const double value : d.pose_uncertainty->covariance) digest = digest_number(value, digest);
     }
   }
   return digest;

@@ -33,6 +33,7 @@ std::optional<MemoryScrub::Altered> MemoryScrub::check(std::size_t bytes) {
     const Piece& piece = pieces_[next_];
     next_ = next_ + 1 < pieces_.size() ? next_ + 1 : 0;
     done += piece.bytes;
+    checked_ += piece.bytes;
     if (crc32(piece.at, piece.bytes) != piece.crc) return Altered{piece.what, piece.owner};
   }
   return std::nullopt;

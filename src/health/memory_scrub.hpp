@@ -25,6 +25,8 @@ class MemoryScrub {
   std::optional<Altered> check(std::size_t bytes);
 
   std::size_t bytes() const { return bytes_; }
+  /// All that was checked so far.
+  u64 checked() const { return checked_; }
 
  private:
   struct Piece {
@@ -36,6 +38,7 @@ class MemoryScrub {
   };
   std::vector<Piece> pieces_;
   std::size_t next_ = 0, bytes_ = 0;
+  u64 checked_ = 0;
 };
 
 /// The code and the constant tables of the module that this is linked into, where the system tells: kernels of the CPU

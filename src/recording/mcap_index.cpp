@@ -23,8 +23,8 @@ IndexedFile::IndexedFile(const std::string& path, const std::function<bool(const
     : path_(path), wanted_(wanted) {
   // Complains of what is no recording, in the words of whoever else reads one.
   file_bytes_ = RecordScan(path).file_bytes();
-  file_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file_ < 0) {
+  file_.number = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file_.number < 0) {
     throw Error(path + ": the recording cannot be read (" + std::strerror(errno) + "); check its permissions");
   }
   by_index_ = take_index();
@@ -36,15 +36,15 @@ IndexedFile::IndexedFile(const std::string& path, const std::function<bool(const
   }
 }
 
-IndexedFile::~IndexedFile() {
-  if (file_ >= 0) close(file_);
+IndexedFile::OpenFile::~OpenFile() {
+  if (number >= 0) close(number);
 }
 
 bool IndexedFile::read_at(u64 offset, std::size_t size, Bytes& to) const {
   to.resize(size);
   std::size_t at = 0;
   while (at < size) {
-    const ssize_t got = pread(file_, to.data() + at, size - at, static_cast<off_t>(offset + at));
+    const ssize_t got = pread(file_.number, to.data() + at, size - at, static_cast<off_t>(offset + at));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return false;
     at += static_cast<std::size_t>(got);
@@ -96,6 +96,9 @@ bool IndexedFile::take_chunk_index(FieldReader& fields, u64 summary_start) {
   const u64 indexes = fields.number<u64>();
   const u64 room = chunk.offset < summary_start ? summary_start - chunk.offset : 0;
   if (!fields.ok() || chunk.size > room || indexes > room - chunk.size || indexes > kMostRecord) return false;
+  // In the file's order, none twice: a short file can name no more than it has.
+  if (chunk.offset < index_end_) return false;
+  index_end_ = chunk.offset + chunk.size + indexes;
   Bytes bytes;
   if (!read_at(chunk.offset + chunk.size, static_cast<std::size_t>(indexes), bytes)) return false;
   FieldReader left(bytes.data(), bytes.size());

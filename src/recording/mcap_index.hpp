@@ -23,7 +23,6 @@ class IndexedFile {
  public:
   /// `wanted`: the topics to look for. Throws Error where the file cannot be read or is no MCAP file.
   IndexedFile(const std::string& path, const std::function<bool(const std::string& topic)>& wanted);
-  ~IndexedFile();
   IndexedFile(const IndexedFile&) = delete;
   IndexedFile& operator=(const IndexedFile&) = delete;
 
@@ -50,11 +49,20 @@ class IndexedFile {
 
   std::string path_;
   std::function<bool(const std::string&)> wanted_;
-  int file_ = -1;
+  /// Closes itself, also where the constructor throws.
+  struct OpenFile {
+    OpenFile() = default;
+    ~OpenFile();
+    OpenFile(const OpenFile&) = delete;
+    OpenFile& operator=(const OpenFile&) = delete;
+    int number = -1;
+  };
+  OpenFile file_;
   std::vector<IndexedChunk> chunks_;
   std::map<u16, Channel> channels_;
   Problems problems_;
   bool by_index_ = false, complete_ = false;
+  u64 index_end_ = 0;  // of the chunks whose index was read
   u64 whole_bytes_ = 0, file_bytes_ = 0;
 };
 

@@ -6,6 +6,7 @@
 #include "berth/error.hpp"
 #include "berth/marker.hpp"
 #include "near_names.hpp"
+#include "target/family_name.hpp"
 
 namespace berth {
 namespace {
@@ -27,7 +28,7 @@ struct FamilyTable {
 
 #include BERTH_FAMILIES_INC_FILE
 
-constexpr int kFamilyCount = static_cast<int>(sizeof kFamilyTables / sizeof kFamilyTables[0]);
+constexpr std::size_t kFamilyCount = sizeof kFamilyTables / sizeof kFamilyTables[0];
 
 std::unique_ptr<const MarkerFamily> make_family(const FamilyTable& table) {
   auto family = std::make_unique<MarkerFamily>();
@@ -45,6 +46,8 @@ std::unique_ptr<const MarkerFamily> make_family(const FamilyTable& table) {
 
 }  // namespace
 
+const char* family_name_at(std::size_t index) { return index < kFamilyCount ? kFamilyTables[index].name : nullptr; }
+
 const std::vector<std::string>& family_names() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> result;
@@ -58,7 +61,7 @@ const MarkerFamily& family(const std::string& name) {
   // Immutable once made, and made only when asked for: the large families are half a megabyte each.
   static std::mutex mutex;
   static std::unique_ptr<const MarkerFamily> families[kFamilyCount];
-  for (int i = 0; i < kFamilyCount; ++i) {
+  for (std::size_t i = 0; i < kFamilyCount; ++i) {
     if (name != kFamilyTables[i].name) continue;
     const std::lock_guard<std::mutex> lock(mutex);
     if (!families[i]) families[i] = make_family(kFamilyTables[i]);

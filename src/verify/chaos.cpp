@@ -20,6 +20,7 @@
 #include "frame/traffic.hpp"
 #include "health/known_answer.hpp"
 #include "health/memory_scrub.hpp"
+#include "sim/random.hpp"
 #include "support/faulty_backend.hpp"
 #include "verify/chaos_scenes.hpp"
 
@@ -48,11 +49,9 @@ class Dice {
  public:
   Dice(u64 seed, u64 index) : state_(seed * 0x9e3779b97f4a7c15u + index * 0xd1342543de82ef95u) {}
   std::size_t below(std::size_t count) {
+    const u64 bits = sim::scatter(state_);
     state_ += 0x9e3779b97f4a7c15u;
-    u64 z = state_;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return static_cast<std::size_t>((z ^ (z >> 31)) % count);
+    return static_cast<std::size_t>(bits % count);
   }
 
  private:
@@ -272,11 +271,11 @@ struct ChaosCampaign::Impl {
     const rlimit no_core = {0, 0};
     setrlimit(RLIMIT_CORE, &no_core);
     // Either ends the process by its signal.
-    alarm(kHangSeconds);
     const itimerval limit = {{0, 0}, {patience / CLOCKS_PER_SEC, patience % CLOCKS_PER_SEC * 1000000 / CLOCKS_PER_SEC}};
     if (freopen("/dev/null", "w", stderr) == nullptr) _exit(1);  // sanitizers say at length what is wanted here
     for (; index < most; ++index) {
       setitimer(ITIMER_PROF, &limit, nullptr);
+      alarm(kHangSeconds);
       Dice dice(seed, index);
       const ChaosRegion region = region_of(index);
       const int said = run(region, dice);

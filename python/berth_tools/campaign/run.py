@@ -100,7 +100,7 @@ def one_by_one(tasks: list[Task], berth: str) -> Iterator[tuple[Task, Any]]:
     for task in tasks:
         try:
             yield task, perform(task, berth)
-        except CampaignError as error:
+        except Exception as error:  # whatever it is, as a worker's
             yield task, TaskFailure(task, str(error))
 
 

@@ -75,6 +75,9 @@ def render_tasks(scenarios: list[str], seeds: list[int], frames: int, version: s
 
 def evaluation_tasks(recordings: list[str], arguments: list[str], version: str) -> list[Task]:
     """`berth run` over each recording, with these arguments. Workers read the recordings by the paths given."""
+    for unfit in ("--fps", "--stream", "--json"):
+        if any(argument == unfit or argument.startswith(unfit + "=") for argument in arguments):
+            raise CampaignError(f"{unfit} stands behind --, but evaluations search every frame once; leave it out")
     tasks = []
     for path in recordings:
         spec = {"kind": "evaluate", "recording": pathlib.Path(path).name, "sha256": file_digest(path),
@@ -170,7 +173,7 @@ def evaluate(task: Task, berth: str) -> dict[str, bytes]:
     rows = io.StringIO()
     table = csv.writer(rows, lineterminator="\n")
     table.writerow(["frame", "family", "id", "shown", "found", "error_mm", "error_deg"])
-    for line in log.splitlines():
+    for line in filter(None, log.split("\n")):  # labels may hold other ends of lines
         frame = json.loads(line)
         found = {(one["family"], one["id"]): one for one in frame["detections"]}
         shown = {(one["family"], one["id"]): one for one in frame.get("truth", [])}
