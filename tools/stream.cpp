@@ -124,7 +124,7 @@ class StreamRun {
   void gather_paced(const StreamFrame& source, const PipelineFrame& frame, bool first_round) {
     if (frame.backend != paced_backend_) {
       console_.note(source.label + ": " + engine_->backends()[paced_backend_]->name() +
-                    " was left: " + playing_->engine().reason + "; the frame was run again on " +
+                    " was left: " + playing_->engine().reason + "; from this frame on it is " +
                     engine_->backends()[frame.backend]->name());
       paced_backend_ = frame.backend;
     }
