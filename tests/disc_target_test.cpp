@@ -138,14 +138,14 @@ TEST(DiscChoice, IsDoubtfulInWhateverOrderTheWaysCome) {
   std::vector<Way> ways = {{assignment({0, 1, 2, kNoDisc, 4}), 4, 9},
                            {assignment({1, 2, 0, kNoDisc, 4}), 4, 20},
                            {assignment({0, 1, 2, 3, kNoDisc}), 4, 7}};
-  const auto doubtful = [&](std::initializer_list<std::size_t> order) {
+  const auto doubtful = [&](const std::vector<std::size_t>& order) {
     DiscChoice choice;
     for (const std::size_t i : order) choice.offer(ways[i].assignment, ways[i].used, ways[i].chi_square);
     return choice.is_doubtful();
   };
   const auto in_any_order = [&](bool expected) {
-    for (const auto& order : std::vector<std::initializer_list<std::size_t>>{
-             {0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
+    for (const auto& order :
+         std::vector<std::vector<std::size_t>>{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
       EXPECT_EQ(doubtful(order), expected);
     }
   };

@@ -43,6 +43,20 @@ std::optional<MemoryScrub::Altered> MemoryScrub::check(std::size_t bytes) {
 
 namespace {
 
+// AddressSanitizer has something forbidden to read behind every table.
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define BERTH_TABLES_ARE_GUARDED 1
+#endif
+#elif defined(__SANITIZE_ADDRESS__)
+#define BERTH_TABLES_ARE_GUARDED 1
+#endif
+#ifdef BERTH_TABLES_ARE_GUARDED
+constexpr bool kTablesAreGuarded = true;
+#else
+constexpr bool kTablesAreGuarded = false;
+#endif
+
 /// Adds the segments that cannot be written of the module this function is in.
 int add_own_segments(dl_phdr_info* info, std::size_t, void* to) {
   const auto here = reinterpret_cast<ElfW(Addr)>(&add_own_segments);
@@ -59,10 +73,11 @@ int add_own_segments(dl_phdr_info* info, std::size_t, void* to) {
   if (!is_own) return 0;
   segments([&](const ElfW(Phdr) & segment, ElfW(Addr) at) {
     const bool is_readable = (segment.p_flags & PF_R) != 0 && (segment.p_flags & PF_W) == 0;
-    if (!is_readable) return;
+    const bool is_code = (segment.p_flags & PF_X) != 0;
+    if (!is_readable || (kTablesAreGuarded && !is_code)) return;
     auto& memory = *static_cast<std::vector<ConstantMemory>*>(to);
-    memory.push_back({(segment.p_flags & PF_X) != 0 ? "program code" : "program tables",
-                      reinterpret_cast<const void*>(at), segment.p_filesz});
+    memory.push_back(
+        {is_code ? "program code" : "program tables", reinterpret_cast<const void*>(at), segment.p_filesz});
   });
   return 1;
 }

@@ -51,8 +51,8 @@ struct ChaosTally {
 
 struct ChaosReport {
   u64 seed = 1;
-  /// How many flips are done: flip i is the same in every campaign of a seed by one build, but what an altered address
-  /// points to may be another.
+  /// How many flips are done: flip i is the same in every campaign of a seed by one build, but what an altered index or
+  /// address leads to may be another.
   u64 flips = 0;
   std::array<ChaosTally, kChaosRegions> regions;
 
