@@ -27,10 +27,8 @@ namespace {
 using test::ScratchFolder;
 using test::text_of;
 using test::WebClient;
-using testing::DoubleNear;
 using testing::HasSubstr;
 using testing::Not;
-using testing::StartsWith;
 
 constexpr double kDegree = 0.017453292519943295;
 const std::string kScenario = std::string(BERTH_SOURCE_DIR) + "/scenarios/approach.toml";
