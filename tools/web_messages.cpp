@@ -11,15 +11,14 @@
 namespace berth::cli {
 namespace {
 
-/// To so many decimals; null where it is no number.
+constexpr double kMicro = 1e6, kTenThousandth = 1e4;
+
+}  // namespace
+
 Json rounded(double value, double scale) {
   if (!std::isfinite(value)) return nullptr;
   return std::round(value * scale) / scale;
 }
-
-constexpr double kMicro = 1e6, kTenThousandth = 1e4;
-
-}  // namespace
 
 std::string new_run_name() {
   std::random_device device;

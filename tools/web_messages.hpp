@@ -25,6 +25,9 @@ struct WebAbout {
   bool can_control = false;
 };
 
+/// To so many decimals (1e4: four); null where it is no number.
+Json rounded(double value, double scale);
+
 /// For WebAbout::run.
 std::string new_run_name();
 

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <mutex>
 #include <thread>
@@ -45,8 +44,6 @@ struct OpenChunk {
 };
 
 bool is_image(const std::string& topic) { return topic.rfind(kImageTopic, 0) == 0; }
-
-double rounded(double value, double scale) { return std::round(value * scale) / scale; }
 
 class OpenedRun final : public RecordedRun {
  public:
