@@ -15,7 +15,7 @@ constexpr double kMostRows = 40, kTrim = 0.125, kTrim_px = 1, kFewestRows = 3;
 // How many times the bound a row's place is off by noise, by the edge's blur.
 constexpr double kTimesBound = 0.66, kTimesBoundPerBlur = 1.35;
 // Without noise: of sharp edges more, of small blurred markers, whose modules run into each other, far more.
-constexpr double kFloor_px = 0.012, kSharp_px = 0.757, kSmall_px = 0.09, kSmallSide = 21;
+constexpr double kFloor_px = 0.0095, kSharp_px = 0.757, kSmall_px = 0.085, kSmallSide = 21;
 
 double cube(double x) { return x * x * x; }
 
