@@ -47,7 +47,7 @@ TEST(DeviceFrame, IsDoneWhenTheDeviceIsNotWhenTheFrameIsEnqueued) {
   });
   DetectorConfig config;
   config.window_sides = {208};
-  DeviceFrame frame(backend, 640, 480, config);
+  DeviceFrame frame(backend, 640, 480, config, false);
   EXPECT_GT(lazy.began_ns, 0) << "warmed up: a driver may compile in the first frame";
   const GrayImage image = sim::render(sim::corpus_scene("easy", 3, 640, 480));
   pad_frame(image.view(), frame.geometry(), frame.pixels());
@@ -68,7 +68,7 @@ TEST(DeviceFrame, IsDoneOnceEnqueuedWhereThereIsNoDevice) {
   for (const char* name : {"simd", "cpu"}) {
     const std::unique_ptr<Backend> backend = open_backend(name);
     EXPECT_TRUE(backend->make_stream()->is_immediate());
-    DeviceFrame frame(*backend, 320, 240, {});
+    DeviceFrame frame(*backend, 320, 240, {}, false);
     frame.submit();
     const std::int64_t enqueued_ns = monotonic_ns();
     EXPECT_TRUE(frame.finish());

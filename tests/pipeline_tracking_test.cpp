@@ -231,7 +231,7 @@ TEST(PipelineTracking, ResultsHaveRoomForAsManyWindowsAsAFrameMayHave) {
   const std::unique_ptr<Backend> backend = open_backend("simd");
   DetectorConfig config;
   config.window_sides = tracking_window_sides(kWidth, kHeight);
-  const DeviceFrame frame(*backend, kWidth, kHeight, config);
+  const DeviceFrame frame(*backend, kWidth, kHeight, config, true);
   const TrackerConfig limits;
   const double pixels = limits.most_share * kWidth * kHeight;
   const std::size_t most = frame.most_in_frame(limits.most_windows, pixels);

@@ -14,6 +14,7 @@
 
 namespace berth {
 
+class Lockstep;
 struct StageDifference;
 
 /// Room for the lists a frame produces; 0 picks the default for the image size (docs/capacities.md).
@@ -112,7 +113,10 @@ class Detector {
   void list_constants(std::vector<ConstantMemory>& to) const;
 
  private:
+  friend class Lockstep;
   friend std::optional<StageDifference> first_difference(Detector& first, Detector& second);
+  /// `keeps_stages`: what is computed for a window stays until the next frame, to be compared; takes more memory.
+  Detector(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -314,8 +314,8 @@ void HostFinish::give_up(FrameResult& result) {
 }
 
 struct Detector::Impl {
-  Impl(Backend& backend, int width, int height, const DetectorConfig& config)
-      : device(backend, width, height, config), host(width, height, config) {
+  Impl(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages)
+      : device(backend, width, height, config, keeps_stages), host(width, height, config) {
     host.reserve(device, result);
   }
 
@@ -356,7 +356,9 @@ double marker_size_m(const DetectorConfig& config, const MarkerFamily& family, i
 }
 
 Detector::Detector(Backend& backend, int width, int height, const DetectorConfig& config)
-    : impl_(std::make_unique<Impl>(backend, width, height, config)) {}
+    : Detector(backend, width, height, config, config.digests) {}
+Detector::Detector(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages)
+    : impl_(std::make_unique<Impl>(backend, width, height, config, keeps_stages)) {}
 Detector::~Detector() = default;
 Detector::Detector(Detector&&) noexcept = default;
 Detector& Detector::operator=(Detector&&) noexcept = default;

@@ -17,7 +17,7 @@ class DeviceFrame {
   /// Runs an empty frame first: drivers may finish compiling only then, and operations take what they work in.
   /// `keeps_stages`: what every window's plan writes stays until its next frame, for digests and comparisons; else
   /// windows share all that the host does not read. Throws Error as Detector.
-  DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages = true);
+  DeviceFrame(Backend& backend, int width, int height, const DetectorConfig& config, bool keeps_stages);
   DeviceFrame(const DeviceFrame&) = delete;
   DeviceFrame& operator=(const DeviceFrame&) = delete;
 

@@ -37,7 +37,7 @@ std::string to_string(const StageDifference& difference) {
 
 struct Lockstep::Impl {
   Impl(Backend& first_backend, Backend& second_backend, int width, int height, const DetectorConfig& config)
-      : first(first_backend, width, height, config), second(second_backend, width, height, config) {}
+      : first(first_backend, width, height, config, true), second(second_backend, width, height, config, true) {}
 
   Detector first;
   Detector second;
