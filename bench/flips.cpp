@@ -34,9 +34,11 @@ struct Case {
 };
 
 const std::vector<Case> kCases = {
+    {"100 mm, 0.02 px", 0.1, 0.02, false},
     {"100 mm, 0.05 px", 0.1, 0.05, false},
     {"100 mm, 0.08 px", 0.1, 0.08, false},
     {"100 mm, 0.15 px", 0.1, 0.15, false},
+    {"50 mm, 0.02 px", 0.05, 0.02, false},
     {"50 mm, 0.15 px", 0.05, 0.15, false},
     {"100 mm, edges, stations 0.03 px", 0.1, 0.03, true},
     {"100 mm, edges, stations 0.12 px", 0.1, 0.12, true},
