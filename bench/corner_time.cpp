@@ -1,11 +1,14 @@
-// What better corners cost: µs of processor time a marker for the photometric fit, beside what libapriltag's
-// refine_edges adds to its detection of the same frame.
+// What better corners and a pose cost: µs of processor time a marker for the photometric fit and for both poses of a
+// marker's plane, beside what libapriltag's refine_edges adds to its detection of the same frame and its
+// estimate_tag_pose.
 #include <apriltag/apriltag.h>
+#include <apriltag/apriltag_pose.h>
 #include <apriltag/tag36h11.h>
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <vector>
 
@@ -15,6 +18,7 @@
 #include "run_main.hpp"
 #include "sim/close_up.hpp"
 #include "sim/render.hpp"
+#include "target/marker_pose.hpp"
 #include "target/photometric_fit.hpp"
 
 namespace berth::bench {
@@ -22,6 +26,23 @@ namespace {
 
 // Processor time, µs.
 double us() { return 1e3 * ms_on(CLOCK_THREAD_CPUTIME_ID); }
+
+constexpr double kSize_m = 0.08;
+
+/// The least that it took, µs.
+class Least {
+ public:
+  template <class Work>
+  void time(const Work& work) {
+    const double start = us();
+    work();
+    us_ = std::min(us_, us() - start);
+  }
+  double value() const { return us_; }
+
+ private:
+  double us_ = 1e9;
+};
 
 // One frame of one marker, and the least that each way took on it.
 class Frame {
@@ -36,34 +57,52 @@ class Frame {
   }
   bool is_found() const { return detection_.family != nullptr; }
 
-  void time_fit() {
-    Corners corners = detection_.corners;
+  void time_berth() {
+    Corners corners;
     CornerCovariance known;
     CornerFit fit;
-    const double start = us();
-    fit_.refine(image_.view(), *detection_.family, detection_.id, corners, known, fit);
-    fit_us_ = std::min(fit_us_, us() - start);
+    const auto refine = [&] {
+      corners = detection_.corners;
+      fit_.refine(image_.view(), *detection_.family, detection_.id, corners, known, fit);
+    };
+    cold_fit.time(refine);  // libapriltag ran since the last
+    warm_fit.time(refine);
+    Pose found;
+    PoseUncertainty uncertainty;
+    pose.time([&] { marker_pose(scene_.camera, kSize_m, corners, known, found, uncertainty); });
   }
   void time_apriltag(apriltag_detector_t* detector, bool refine) {
     const View2D<const u8> view = image_.view();
     // The library takes no const image and does not write to it.
     image_u8_t image = {view.width, view.height, view.stride, const_cast<u8*>(view.data)};
     detector->refine_edges = refine;
-    const double start = us();
-    zarray_t* const detections = apriltag_detector_detect(detector, &image);
-    double& least = refine ? refined_us_ : plain_us_;
-    least = std::min(least, us() - start);
+    zarray_t* detections = nullptr;
+    (refine ? refined_ : plain_).time([&] { detections = apriltag_detector_detect(detector, &image); });
+    if (refine && zarray_size(detections) > 0) time_apriltag_pose(detections);
     apriltag_detections_destroy(detections);
   }
-  double fit_us() const { return fit_us_; }
-  double apriltag_us() const { return refined_us_ - plain_us_; }
+  double refine_edges_us() const { return refined_.value() - plain_.value(); }
+
+  Least cold_fit, warm_fit, pose, apriltag_pose;
 
  private:
+  void time_apriltag_pose(zarray_t* detections) {
+    apriltag_detection_t* detection = nullptr;
+    zarray_get(detections, 0, &detection);
+    const CameraModel& camera = scene_.camera;
+    apriltag_detection_info_t info = {detection, kSize_m, camera.fx, camera.fy, camera.cx, camera.cy};
+    apriltag_pose_t found;
+    apriltag_pose.time([&] { estimate_tag_pose(&info, &found); });
+    // matd_destroy is not in Debian's shared library; matrices are single blocks.
+    std::free(found.R);
+    std::free(found.t);
+  }
+
   sim::Scene scene_;
   GrayImage image_;
   PhotometricFit fit_;
   Detection detection_;
-  double fit_us_ = 1e9, plain_us_ = 1e9, refined_us_ = 1e9;
+  Least plain_, refined_;
 };
 
 double median(std::vector<double> values) {
@@ -74,7 +113,9 @@ double median(std::vector<double> values) {
 int run(int argc, char** argv) {
   int frames = 15, repeat = 41;
   std::vector<double> sides = {20, 40, 100, 160};
-  CLI::App app("Processor time of better corners, µs a marker: the least of a frame's runs, the median over frames.");
+  CLI::App app(
+      "Processor time of better corners and of poses, µs a marker: the least of a frame's runs, the median over "
+      "frames.");
   app.add_option("--frames", frames, "frames a size")->check(CLI::Range(1, 1000));
   app.add_option("--repeat", repeat, "runs a frame, ways taking turns")->check(CLI::Range(1, 100000));
   app.add_option("--sides", sides, "sides of the marker, px")->delimiter(',')->check(CLI::Range(12, 400));
@@ -85,22 +126,28 @@ int run(int argc, char** argv) {
   apriltag_detector_add_family(apriltag, family);
   apriltag->quad_decimate = 1;
   apriltag->nthreads = 1;
-  fmt::print("| side, px | photometric fit, µs | refine_edges, µs |\n|---|---|---|\n");
+  fmt::print(
+      "| side, px | photometric fit, µs | the same, cold | refine_edges | both poses | estimate_tag_pose |\n"
+      "|---|---|---|---|---|---|\n");
   for (const double side : sides) {
-    std::vector<double> fit, refine;
+    std::vector<double> warm, cold, refine, pose, apriltag_pose;
     for (int i = 0; i < frames; ++i) {
       Frame frame(*backend, {side, 2}, i);
       if (!frame.is_found()) continue;
       for (int k = 0; k < repeat; ++k) {
-        frame.time_fit();
+        frame.time_berth();
         frame.time_apriltag(apriltag, false);
         frame.time_apriltag(apriltag, true);
       }
-      fit.push_back(frame.fit_us());
-      refine.push_back(frame.apriltag_us());
+      warm.push_back(frame.warm_fit.value());
+      cold.push_back(frame.cold_fit.value());
+      refine.push_back(frame.refine_edges_us());
+      pose.push_back(frame.pose.value());
+      apriltag_pose.push_back(frame.apriltag_pose.value());
     }
-    if (fit.empty()) continue;
-    fmt::print("| {} | {:.1f} | {:.1f} |\n", side, median(fit), median(refine));
+    if (warm.empty()) continue;
+    fmt::print("| {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |\n", side, median(warm), median(cold),
+               median(refine), median(pose), median(apriltag_pose));
     std::fflush(stdout);
   }
   apriltag_detector_destroy(apriltag);
