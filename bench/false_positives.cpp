@@ -116,7 +116,7 @@ class Examiner {
   struct Size {
     // The device's part looks for the borders, dark or light, of all of them.
     Size(Backend& backend, int width, const Options& options)
-        : device(backend, width, width / 4 * 3, config_of(options.families)) {
+        : device(backend, width, width / 4 * 3, config_of(options.families), false) {
       for (const std::string& name : options.families) {
         hosts.emplace_back(width, width / 4 * 3, config_of({name}));
       }

@@ -132,6 +132,7 @@ std::vector<Series> measure(const Options& options) {
       {"checkerboard of 1 px", pictures::checkerboard(640, 480, 1)},
       {"checkerboard of 4 px", pictures::checkerboard(640, 480, 4)},
       {"checkerboard of 8 px", pictures::checkerboard(640, 480, 8)},
+      {"checkerboard of 10 px", pictures::checkerboard(640, 480, 10)},
       {"checkerboard of 16 px", pictures::checkerboard(640, 480, 16)},
       {"mazes", pictures::mazes(640, 480, 3)},
       {"800 squares without a code", square_field(800)},

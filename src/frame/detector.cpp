@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "berth/error.hpp"
+#include "frame/corner_match.hpp"
 #include "frame/detector_parts.hpp"
 #include "frame/digest.hpp"
 #include "frame/stages.hpp"
@@ -75,28 +76,6 @@ std::vector<BundlePoser> bundle_posers(const std::vector<Bundle>& bundles,
   return posers;
 }
 
-using Corners = std::array<std::array<double, 2>, 4>;
-
-double square_distance(const std::array<double, 2>& a, const std::array<double, 2>& b) {
-  return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
-}
-
-/// Whether every corner of a has one of b's within `tolerance` px and the other way round: a small quadrilateral at a
-/// corner of a large one is another.
-bool same_corners(const Corners& a, const Corners& b, double tolerance) {
-  unsigned met = 0;
-  for (const auto& corner : a) {
-    bool found = false;
-    for (std::size_t i = 0; i < b.size(); ++i) {
-      if (square_distance(corner, b[i]) >= tolerance * tolerance) continue;
-      found = true;
-      met |= 1U << i;
-    }
-    if (!found) return false;
-  }
-  return met == 15;
-}
-
 }  // namespace
 
 struct HostFinish::Impl {
@@ -127,7 +106,7 @@ struct HostFinish::Impl {
     result.bundles.resize(bundles.size());
     result.disc_targets.resize(config.disc_targets.size());
     found.reserve(frame.most_in_area());
-    refused.reserve(frame.most_in_area());
+    refused = CornerIndex(frame.geometry().width, frame.geometry().height, frame.most_in_area());
   }
 
   void finish(DeviceFrame& frame, FrameResult& result) {
@@ -202,7 +181,7 @@ struct HostFinish::Impl {
         }
         found.push_back(detection);
       } else {
-        refused.push_back(candidate.fine);
+        refused.add(candidate.fine);
       }
     }
   }
@@ -259,10 +238,7 @@ struct HostFinish::Impl {
       const double side = std::sqrt(square_distance(known.corners[0], known.corners[1]));
       if (same_corners(candidate.fine, known.corners, std::max(1.0, side / 10))) return true;
     }
-    for (const Corners& known : refused) {
-      if (same_corners(candidate.fine, known, 0.25)) return true;
-    }
-    return false;
+    return refused.has(candidate.fine, 0.25);
   }
 
   static void take_digests(DeviceFrame& frame, FrameResult& result) {
@@ -285,7 +261,7 @@ struct HostFinish::Impl {
   std::optional<DiscFinder> discs;
   bool is_bending = false;       // straight lines in the world are not straight in the image
   std::vector<Detection> found;  // in the area at hand
-  std::vector<Corners> refused;  // its candidates that hold no marker
+  CornerIndex refused;           // its candidates that hold no marker
 };
 
 HostFinish::HostFinish(int width, int height, const DetectorConfig& config)

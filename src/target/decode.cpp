@@ -56,20 +56,24 @@ class Attempt {
   Attempt(View2D<const u8> image, const Group& group) : image_(image), group_(group) {}
 
   bool read(const QuadCandidate& quad) {
+    const Layout& layout = group_.layout;
     const bool fine = aim(quad.fine);
-    const Seen first = fine ? look(Shade::planes, 0) : Seen::no_border;
+    if (fine && are_cells_even(image_, map_, layout, contrast_)) return false;
+    const QuadMap fine_map = map_;
+    PlaneShading planes;
+    const bool has_border = fine && planes.fit(image_, map_, layout);
+    const Seen first = has_border ? read_cells(image_, map_, layout, planes, 0, reading_) : Seen::no_border;
     if (first == Seen::cells && match(&CodeMatcher::match_bits)) return true;
-    const bool uneven = first == Seen::no_border || reading_.misfit > kMisfit;
     if (first == Seen::nothing) return false;
-    if (quad.has_fine && aim(quad.coarse) && look(Shade::planes, 0) == Seen::cells && match(&CodeMatcher::match_bits)) {
-      return true;
-    }
+    if (quad.has_fine && aim(quad.coarse) && look(PlaneShading(), 0) && match(&CodeMatcher::match_bits)) return true;
     if (!fine) return false;
-    aim(quad.fine);
-    if (first == Seen::cells && look(Shade::planes, kSpread) == Seen::cells && match(&CodeMatcher::match_levels)) {
+    map_ = fine_map;
+    if (first == Seen::cells && read_cells(image_, map_, layout, planes, kSpread, reading_) == Seen::cells &&
+        match(&CodeMatcher::match_levels)) {
       return true;
     }
-    return uneven && look(Shade::edges, kSpread) == Seen::cells &&
+    const bool uneven = !has_border || planes.misfit() > kMisfit;
+    return uneven && look(EdgeShading(), kSpread) &&
            (match(&CodeMatcher::match_bits) || match(&CodeMatcher::match_levels));
   }
 
@@ -87,11 +91,16 @@ class Attempt {
   using Match = CodeMatch (CodeMatcher::*)(const Layout&, const Reading&) const;
 
   bool aim(const Corners& corners) {
-    return map_.set(corners, group_.layout.border_width, group_.layout.reach) &&
-           probe_border(image_, map_, group_.layout);
+    if (!map_.set(corners, group_.layout.border_width, group_.layout.reach)) return false;
+    contrast_ = probe_border(image_, map_, group_.layout);
+    return contrast_ > 0;
   }
 
-  Seen look(Shade shade, double spread) { return read_cells(image_, map_, group_.layout, shade, spread, reading_); }
+  template <class Shading>
+  bool look(Shading shading, double spread) {
+    return shading.fit(image_, map_, group_.layout) &&
+           read_cells(image_, map_, group_.layout, shading, spread, reading_) == Seen::cells;
+  }
 
   // The best match of the reading in any family of the group; the family named first wins a draw.
   bool match(Match how) {
@@ -107,6 +116,7 @@ class Attempt {
   View2D<const u8> image_;
   const Group& group_;
   QuadMap map_;
+  double contrast_ = 0;  // light less dark, as far as the border's probes tell
   Reading reading_;
   Found found_;
 };

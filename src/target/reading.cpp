@@ -17,6 +17,9 @@ constexpr int kMaxProbesWrong = 4;
 // other; a plain dark or light shape's do not.
 constexpr double kMinVariation = 0.25;
 
+// A far smaller share: before the border's shading is known, and where a part of the marker lies in the shadow.
+constexpr double kMaxEven = 1.0 / 32;
+
 // Where the local contrast is smaller than this share of the mean, a cell is not taken to the mean contrast in full.
 constexpr double kMinLocalContrast = 0.25;
 
@@ -99,7 +102,7 @@ Seen fill(View2D<const u8> image, const QuadMap& map, const Layout& layout, cons
 
 }  // namespace
 
-bool probe_border(View2D<const u8> image, const QuadMap& map, const Layout& layout) {
+double probe_border(View2D<const u8> image, const QuadMap& map, const Layout& layout) {
   std::array<double, kProbes> value;
   std::array<bool, kProbes> is_light;
   double sum[2] = {0, 0};
@@ -116,29 +119,42 @@ bool probe_border(View2D<const u8> image, const QuadMap& map, const Layout& layo
     ++count[light];
     ++n;
   }
-  if (count[0] < 4 || count[1] < 4) return false;
+  if (count[0] < 4 || count[1] < 4) return 0;
   const double dark = sum[0] / count[0];
   const double light = sum[1] / count[1];
-  if (!(light - dark >= kMinContrast)) return false;
+  if (!(light - dark >= kMinContrast)) return 0;
   const double threshold = (light + dark) / 2;
   int wrong = 0, pairs_right = 0;
   for (int i = 0; i < n; ++i) wrong += (value[i] > threshold) != is_light[i];
   // Under a strong gradient no one threshold fits, but the two rings still differ at every place.
   for (int i = 0; i < n / 2; ++i) pairs_right += (value[i] > value[i + n / 2]) == is_light[i];
-  return wrong <= kMaxProbesWrong || (n == kProbes && pairs_right == kProbes / 2);
+  return wrong <= kMaxProbesWrong || (n == kProbes && pairs_right == kProbes / 2) ? light - dark : 0;
 }
 
-Seen read_cells(View2D<const u8> image, const QuadMap& map, const Layout& layout, Shade shade, double spread,
-                Reading& reading) {
-  if (shade == Shade::edges) {
-    EdgeShading shading;
-    if (!shading.fit(image, map, layout)) return Seen::no_border;
-    reading.misfit = 0;
-    return fill(image, map, layout, shading, spread, reading);
+bool are_cells_even(View2D<const u8> image, const QuadMap& map, const Layout& layout, double contrast) {
+  double u[kMaxCells], v[kMaxCells];
+  const int cells = static_cast<int>(layout.x.size());
+  for (std::size_t i = 0; i < layout.x.size(); ++i) {
+    u[i] = layout.x[i] + 0.5;
+    v[i] = layout.y[i] + 0.5;
   }
-  PlaneShading shading;
-  if (!shading.fit(image, map, layout)) return Seen::no_border;
-  reading.misfit = shading.misfit();
+  PointSamples samples;
+  sample_points(image, map, u, v, cells, samples);
+  double mean = 0, square = 0;
+  for (int i = 0; i < cells; ++i) {
+    mean += samples.value[i];
+    square += samples.value[i] * samples.value[i];
+  }
+  const double most = kMaxEven * contrast / 2;
+  return square - mean * mean / cells < cells * most * most;
+}
+
+Seen read_cells(View2D<const u8> image, const QuadMap& map, const Layout& layout, const PlaneShading& shading,
+                double spread, Reading& reading) {
+  return fill(image, map, layout, shading, spread, reading);
+}
+Seen read_cells(View2D<const u8> image, const QuadMap& map, const Layout& layout, const EdgeShading& shading,
+                double spread, Reading& reading) {
   return fill(image, map, layout, shading, spread, reading);
 }
 
