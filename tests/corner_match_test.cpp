@@ -10,7 +10,9 @@
 namespace berth {
 namespace {
 
-Corners square(double x, double y, double side) { return {{{x, y}, {x + side, y}, {x + side, y + side}, {x, y + side}}}; }
+Corners square(double x, double y, double side) {
+  return {{{x, y}, {x + side, y}, {x + side, y + side}, {x, y + side}}};
+}
 
 TEST(CornerIndex, FindsWhatComparingEachFinds) {
   constexpr int kWidth = 61, kHeight = 45;  // no multiples of a cell
