@@ -154,6 +154,7 @@ TEST(RosHealth, SaysWhatIsWrongAndCounts) {
   EXPECT_EQ(values,
             "frames=2 frames_with_pose=2 frames_per_second=4.0 frames_dropped=2 frames_not_published=1 "
             "messages_not_sent=2 mode=nominal valid=true known_answers=0 wrong_answers=0 memory_alterations=0 "
+            "backend_tries=0 backend_returns=0 recovery= "
             "latency_p50_ms=2.007 latency_p99_ms=4.000 ");
   EXPECT_EQ(health.report(5, 1.5, {}).status[0].level, ros2::Level::stale);
   result.stamp.sequence = 14;

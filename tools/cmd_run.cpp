@@ -122,6 +122,13 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
                        "pace, else none]")
           ->type_name("SECONDS")
           ->check(CLI::Range(0.0, 1e6));
+  command
+      ->add_option("--fail-back", options->stream.fail_back_s,
+                   "with --known-answer: a backend that was left is opened anew after so many seconds, then less and "
+                   "less often, and gone back to once it gives right answers; 0 for never")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   add_record_options(*command, options->record);
   add_report_option(*command, options->web);
   add_view_options(*command, options->web);
@@ -175,6 +182,9 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
           "the two out");
     }
     if (known_answer->count() == 0 && (is_camera || given.fps != 0)) options->stream.known_answer_s = kKnownAnswerS;
+    if (options->stream.fail_back_s > 0 && options->stream.known_answer_s == 0) {
+      throw Error("--fail-back believes a backend again by its known answers; give --known-answer SECONDS, too");
+    }
     if (options->stream.track && !options->stream.engine.target_files.empty()) {
       throw Error(
           "--track searches in windows, which show markers alone; --target needs whole frames: leave one of the two "

@@ -166,6 +166,11 @@ EngineBackends open_chosen_backends(const EngineOptions& options) {
   if (fallback != "none" && (!options.fallback.empty() || !runs_on_host(*opened.backends.front()))) {
     opened.backends.push_back(open_named("--fallback", fallback, second_options));
   }
+  std::vector<std::string> names;
+  for (const auto& backend : opened.backends) names.emplace_back(backend->name());
+  opened.reopen = [names, first_options, second_options](std::size_t i) {
+    return open_backend(names[i], i == 0 ? first_options : second_options);
+  };
   return opened;
 }
 

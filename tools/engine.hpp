@@ -2,6 +2,7 @@
 
 #include <CLI/App.hpp>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -45,6 +46,8 @@ struct EngineOptions {
 struct EngineBackends {
   std::vector<std::unique_ptr<Backend>> backends;
   bool lockstep = false;
+  /// Opens one of them anew. Throws Error.
+  std::function<std::unique_ptr<Backend>(std::size_t)> reopen;
 };
 
 /// --backend, --device, --threads

@@ -25,14 +25,25 @@ void print_health(std::ostream& people, const HealthReport& engine) {
                           static_cast<double>(engine.checked_bytes) / static_cast<double>(engine.watched_bytes),
                           engine.alterations);
   }
+  if (engine.tries > 0) {
+    people << fmt::format("; backends that were left opened anew {} time{}, {} of them back in use{}", engine.tries,
+                          engine.tries == 1 ? "" : "s", engine.returns,
+                          engine.recovery[0] == '\0' ? "" : std::string(", ") + engine.recovery);
+  }
   people << '\n';
 }
 
 Json to_json(const HealthReport& engine) {
-  return {{"mode", name_of(engine.mode)},          {"reason", engine.reason},
-          {"known_answers", engine.known_answers}, {"wrong_answers", engine.wrong_answers},
-          {"watched_bytes", engine.watched_bytes}, {"checked_bytes", engine.checked_bytes},
-          {"alterations", engine.alterations}};
+  return {{"mode", name_of(engine.mode)},
+          {"reason", engine.reason},
+          {"known_answers", engine.known_answers},
+          {"wrong_answers", engine.wrong_answers},
+          {"watched_bytes", engine.watched_bytes},
+          {"checked_bytes", engine.checked_bytes},
+          {"alterations", engine.alterations},
+          {"tries", engine.tries},
+          {"returns", engine.returns},
+          {"recovery", engine.recovery}};
 }
 
 }  // namespace berth::cli

@@ -162,7 +162,10 @@ void RecordingFile::write_health(const QueuedFrame& frame, std::uint64_t dropped
                            number("known_answers", frame.engine.known_answers),
                            number("wrong_answers", frame.engine.wrong_answers),
                            number("checked_bytes", frame.engine.checked_bytes),
-                           number("alterations", frame.engine.alterations)}});
+                           number("alterations", frame.engine.alterations),
+                           number("tries", frame.engine.tries),
+                           number("returns", frame.engine.returns),
+                           {"recovery", frame.engine.recovery}}});
   ros2::write(array, cdr_);
   send(health_);
 }

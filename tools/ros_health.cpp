@@ -81,7 +81,10 @@ const ros2::DiagnosticArray& RosHealth::report(std::int64_t stamp_ns, double sec
                    {"valid", mode < HealthMode::stale ? "true" : "false"},
                    {"known_answers", fmt::to_string(engine_.known_answers)},
                    {"wrong_answers", fmt::to_string(engine_.wrong_answers)},
-                   {"memory_alterations", fmt::to_string(engine_.alterations)}};
+                   {"memory_alterations", fmt::to_string(engine_.alterations)},
+                   {"backend_tries", fmt::to_string(engine_.tries)},
+                   {"backend_returns", fmt::to_string(engine_.returns)},
+                   {"recovery", engine_.recovery}};
   if (latencies_.count() > 0) {
     status.values.push_back({"latency_p50_ms", ms(0.5)});
     status.values.push_back({"latency_p99_ms", ms(0.99)});

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <set>
 #include <string_view>
 
@@ -123,9 +124,12 @@ class StreamRun {
 
   void gather_paced(const StreamFrame& source, const PipelineFrame& frame, bool first_round) {
     if (frame.backend != paced_backend_) {
-      console_.note(source.label + ": " + engine_->backends()[paced_backend_]->name() +
-                    " was left: " + playing_->engine().reason + "; from this frame on it is " +
-                    engine_->backends()[frame.backend]->name());
+      const std::string before = engine_->backends()[paced_backend_]->name();
+      const std::string now = engine_->backends()[frame.backend]->name();
+      console_.note(source.label + ": " +
+                    (frame.backend < paced_backend_
+                         ? now + " was opened anew and gives right answers; from this frame on it is " + now + " again"
+                         : before + " was left: " + playing_->engine().reason + "; from this frame on it is " + now));
       paced_backend_ = frame.backend;
     }
     tracked_ = frame.tracked;
@@ -147,6 +151,13 @@ class StreamRun {
     if (options_.known_answer_s == 0) return std::nullopt;
     HealthConfig health;
     health.known_answer_every_ns = std::llround(options_.known_answer_s * 1e9);
+    if (options_.fail_back_s > 0) {
+      RecoveryConfig recovery;
+      recovery.open = reopen_;
+      recovery.first_wait_ns = std::llround(options_.fail_back_s * 1e9);
+      recovery.longest_wait_ns = std::max(recovery.longest_wait_ns, recovery.first_wait_ns);
+      health.recovery = recovery;
+    }
     return health;
   }
 
@@ -183,8 +194,9 @@ class StreamRun {
     if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
     if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    engine_.emplace(open_chosen_backends(engine_options), std::move(config), engine_options.camera_fit, tracking(),
-                    health());
+    EngineBackends opened = open_chosen_backends(engine_options);
+    reopen_ = opened.reopen;
+    engine_.emplace(std::move(opened), std::move(config), engine_options.camera_fit, tracking(), health());
     const std::string backend = engine_->describe();
     people_ << "backend " << backend << '\n';
     const DetectorConfig sized = engine_->config_for(frame.image.width(), frame.image.height());
@@ -228,9 +240,15 @@ class StreamRun {
       filters_.foretell(frame.stamp.mid_exposure_ns, camera_of(shown), *engine_->tracker());
     }
     const Backend* before = &engine_->backend();
+    const u64 returns = engine_->health().returns;
     const TimedResult timed = engine_->detect(frame.image.view(), frame.stamp);
     FrameResult result = timed.frame;
-    if (&engine_->backend() != before) {
+    if (engine_->health().returns > returns) {
+      console_.note(frame.label +
+                    ": a backend that was left was opened anew and gives right answers; from this frame "
+                    "on it is " +
+                    engine_->describe());
+    } else if (&engine_->backend() != before) {
       console_.note(frame.label + ": " + before->name() + " was left: " + engine_->health().reason +
                     "; the frame was run again on " + engine_->describe());
     }
@@ -425,6 +443,7 @@ class StreamRun {
   LiveView view_;
   std::ofstream log_;
   std::optional<Engine> engine_;
+  std::function<std::unique_ptr<Backend>(std::size_t)> reopen_;  // those of the engine
   SystematicErrors errors_;
   std::vector<std::optional<std::array<double, 36>>> systematic_;  // of the frame's detections
   bool size_given_ = false, refused_ = false;

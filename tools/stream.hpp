@@ -34,6 +34,8 @@ struct StreamOptions {
   std::uint64_t max_frames = 0;
   /// A known answer at start and every so many seconds, memory checked all the while; 0: neither.
   double known_answer_s = 0;
+  /// A backend that was left is tried again after so many seconds; 0: never.
+  double fail_back_s = 0;
   /// In real time, through a pipeline.
   PaceOptions pace;
   /// They get every frame, whichever way it took.

@@ -14,7 +14,9 @@ class HealthWatch;
 
 /// Detectors of one configuration on several backends, in order of preference, all made at start. A frame whose device
 /// is lost is run again on the next backend, and so are all after it: no frame is lost, and the bits stay the same.
-/// With a HealthConfig a backend is also left for a wrong known answer, or where memory of its detector was altered.
+/// With a HealthConfig a backend is also left for a wrong known answer, or where memory of its detector was altered;
+/// with its RecoveryConfig one that was left is opened anew meanwhile, and gone back to before a frame once it has
+/// proven itself.
 class FailoverDetector {
  public:
   /// The backends outlive this object; there is at least one. Throws Error as Detector does.
@@ -33,10 +35,11 @@ class FailoverDetector {
   std::size_t device_bytes() const;
 
  private:
-  void ask(std::size_t backend);
+  void ask(std::size_t backend, bool everything);
+  bool go_back();
 
+  std::unique_ptr<HealthWatch> watch_;  // first: it has the backends that were opened anew
   std::vector<Detector> detectors_;
-  std::unique_ptr<HealthWatch> watch_;
   FrameResult none_;  // where no backend is left
 };
 

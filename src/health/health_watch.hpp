@@ -8,6 +8,7 @@
 #include "berth/health.hpp"
 #include "health/known_answer.hpp"
 #include "health/memory_scrub.hpp"
+#include "health/recovery.hpp"
 
 namespace berth {
 
@@ -21,13 +22,23 @@ class HealthWatch {
 
   bool is_on() const { return known_ != nullptr; }
   /// Memory to check: of one backend's detector, or all of theirs (MemoryScrub::kShared).
-  void watch(const std::vector<ConstantMemory>& memory, int owner) { scrub_.add(memory, owner); }
+  void watch(const std::vector<ConstantMemory>& memory, int owner);
+  /// Where a recovery is configured: from now on, backends that are left are tried again. `make` must not outlive what
+  /// it uses.
+  void recover_by(Recovery::Make make);
+  /// No backend is tried any more; waits for a try under way.
+  void stop_recovery();
+  /// One that was left and has proven itself since, or null. To be put in place of what there was, then taken back.
+  Returned* proven() { return recovery_ ? recovery_->proven() : nullptr; }
+  void take_back(Returned& returned);
 
-  View2D<const u8> picture() const { return known_->image(); }
+  const KnownAnswer& known() const { return *known_; }
+  /// What is to be asked beside the whole frame this time: each of the known answer's windows in turn.
+  std::size_t next_windows();
   /// Whether the known answer is due, on `now_ns` of the monotonic clock.
   bool is_due(std::int64_t now_ns) const;
-  /// What a backend made of the picture; whether that is right.
-  bool answer(std::size_t backend, const FrameResult& result, std::int64_t now_ns);
+  /// Whether a backend answered rightly, or lost its device.
+  void answer(std::size_t backend, bool is_right, bool is_lost, std::int64_t now_ns);
   /// The next slice of memory.
   void scrub();
   void lose(std::size_t backend) { leave(backend, "its device was lost"); }
@@ -40,15 +51,23 @@ class HealthWatch {
 
  private:
   void leave(std::size_t backend, const char* reason);
+  void find_active();
+  void count_watched();
+  MemoryScrub& scrub_of(int owner) { return scrubs_[static_cast<std::size_t>(owner - MemoryScrub::kShared)]; }
 
   HealthConfig config_;
   std::unique_ptr<const KnownAnswer> known_;
-  MemoryScrub scrub_;
+  /// What all use, then each backend's.
+  std::vector<MemoryScrub> scrubs_;
+  std::size_t scrubbed_ = 0;  // the one at hand
+  std::size_t windows_ = 0;
   std::vector<char> good_;
   std::int64_t answered_ns_ = 0;
   std::atomic<std::size_t> active_ = 0;
   std::atomic<const char*> reason_ = "";
   std::atomic<u64> answers_ = 0, wrong_ = 0, checked_ = 0, altered_ = 0;
+  std::atomic<std::size_t> watched_ = 0;
+  std::unique_ptr<Recovery> recovery_;
 };
 
 }  // namespace berth

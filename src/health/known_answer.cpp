@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <utility>
 
 #include "berth/backend.hpp"
 #include "frame/digest.hpp"
 #include "frame/result_digest.hpp"
+#include "frame/window.hpp"
 #include "target/marker_pattern.hpp"
 
 namespace berth {
@@ -70,9 +72,19 @@ void soften(GrayImage& image, u64& random) {
   }
 }
 
-DetectorConfig whole_frames(DetectorConfig config) {
-  config.window_sides.clear();
-  return config;
+/// All windows of each side there is, here and there in the picture.
+std::vector<std::vector<SearchWindow>> window_parts(int width, int height, const std::vector<int>& sides) {
+  std::vector<std::vector<SearchWindow>> parts;
+  for (const int side : sides) {
+    auto part = std::find_if(parts.begin(), parts.end(), [side](const auto& one) { return one.front().side == side; });
+    if (part == parts.end()) part = parts.insert(parts.end(), std::vector<SearchWindow>());
+    const int k = static_cast<int>(part->size()) + static_cast<int>(part - parts.begin());
+    const auto place = [&](int length, int stride) {
+      return stride * k % ((length - side) / kWindowStep + 1) * kWindowStep;
+    };
+    part->push_back({side, place(width, 7), place(height, 5)});
+  }
+  return parts;
 }
 
 }  // namespace
@@ -106,8 +118,12 @@ GrayImage known_picture(int width, int height, const std::vector<std::string>& f
 KnownAnswer::KnownAnswer(int width, int height, const DetectorConfig& config)
     : image_(known_picture(width, height, config.families)) {
   const std::unique_ptr<Backend> reference = open_backend("reference");
-  Detector detector(*reference, width, height, whole_frames(config));
-  expected_ = digest(detector.detect(image_.view()));
+  Detector detector(*reference, width, height, config);
+  parts_.emplace_back();
+  for (std::vector<SearchWindow>& windows : window_parts(width, height, config.window_sides)) {
+    parts_.push_back({std::move(windows), 0});
+  }
+  for (Part& part : parts_) part.expected = digest(detector.detect(image_.view(), {}, part.windows));
 }
 
 u64 KnownAnswer::digest(const FrameResult& result) {

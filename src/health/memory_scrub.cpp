@@ -26,15 +26,28 @@ void MemoryScrub::add(const std::vector<ConstantMemory>& blocks, int owner) {
   }
 }
 
+std::optional<MemoryScrub::Altered> MemoryScrub::check_next(std::size_t& done) {
+  const Piece& piece = pieces_[next_];
+  next_ = next_ + 1 < pieces_.size() ? next_ + 1 : 0;
+  done += piece.bytes;
+  checked_ += piece.bytes;
+  if (crc32(piece.at, piece.bytes) == piece.crc) return std::nullopt;
+  return Altered{piece.what, piece.owner};
+}
+
 std::optional<MemoryScrub::Altered> MemoryScrub::check(std::size_t bytes) {
   std::size_t done = 0;
   // Once around at most: small blocks must not be checked twice for a large slice.
   for (std::size_t looked = 0; looked < pieces_.size() && done < bytes; ++looked) {
-    const Piece& piece = pieces_[next_];
-    next_ = next_ + 1 < pieces_.size() ? next_ + 1 : 0;
-    done += piece.bytes;
-    checked_ += piece.bytes;
-    if (crc32(piece.at, piece.bytes) != piece.crc) return Altered{piece.what, piece.owner};
+    if (const std::optional<Altered> found = check_next(done)) return found;
+  }
+  return std::nullopt;
+}
+
+std::optional<MemoryScrub::Altered> MemoryScrub::check_on(std::size_t bytes, std::size_t& done) {
+  while (!pieces_.empty() && done < bytes) {
+    if (const std::optional<Altered> found = check_next(done)) return found;
+    if (next_ == 0) break;
   }
   return std::nullopt;
 }

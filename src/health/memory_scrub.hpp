@@ -23,12 +23,18 @@ class MemoryScrub {
   void add(const std::vector<ConstantMemory>& blocks, int owner);
   /// Goes on where it stopped, round and round, for `bytes` at least. The first piece that differs ends it.
   std::optional<Altered> check(std::size_t bytes);
+  /// The same as long as `done` is less, and no further than to the end; adds to `done` what was checked.
+  std::optional<Altered> check_on(std::size_t bytes, std::size_t& done);
+  /// Whether the next piece is the first.
+  bool is_at_start() const { return next_ == 0; }
 
   std::size_t bytes() const { return bytes_; }
   /// All that was checked so far.
   u64 checked() const { return checked_; }
 
  private:
+  std::optional<Altered> check_next(std::size_t& done);
+
   struct Piece {
     const unsigned char* at;
     std::size_t bytes;

@@ -15,6 +15,7 @@
 #include "frame/detector_parts.hpp"
 #include "health/health_watch.hpp"
 #include "monotonic.hpp"
+#include "pipeline/returned_frames.hpp"
 #include "pipeline/slot_ring.hpp"
 #include "pipeline/thread_setup.hpp"
 
@@ -63,6 +64,8 @@ PipelineConfig checked(PipelineConfig config, int width, int height) {
 /// One slot: a frame on each backend, of which one has the pixels, and its result.
 struct Slot {
   std::vector<std::unique_ptr<DeviceFrame>> devices;
+  /// Which backends, opened anew, they are of; null for those that the pipeline was made with.
+  std::vector<const ReturnedFrames*> origins;
   std::size_t on = 0;
   /// False where enqueueing has thrown: there is nothing to wait for then.
   bool submitted = false;
@@ -90,13 +93,15 @@ struct Pipeline::Impl {
   Impl(const std::vector<Backend*>& backends, int width, int height, const PipelineConfig& wanted, Deliver callback)
       : config(checked(wanted, width, height)),
         deliver(std::move(callback)),
+        watch(config.health, width, height, config.detector, backends.size()),
         ring(config.slots, config.overrun, config.tracking ? config.tracking->behind : 0),
-        watch(config.health, width, height, config.detector, backends.size()) {
+        returned(backends.size()) {
     if (backends.empty()) throw Error("a pipeline needs a backend; give at least one");
     if (config.tracking) tracker.emplace(width, height, *config.tracking);
     slots.resize(static_cast<std::size_t>(config.slots));
     for (std::size_t i = 0; i < slots.size(); ++i) {
       Slot& slot = slots[i];
+      slot.origins.resize(backends.size());
       for (Backend* backend : backends) {
         slot.devices.push_back(
             std::make_unique<DeviceFrame>(*backend, width, height, config.detector, config.detector.digests));
@@ -113,15 +118,41 @@ struct Pipeline::Impl {
       slot.tracked.result = &slot.result;
       slot.frame.tracked = &slot.tracked;
     }
+    count_memory();
     if (watch.is_on()) begin_watch();
     ring.close();  // until start: a frame that nobody takes would stand in no count
+    watch.recover_by([this, width, height](std::unique_ptr<Backend> opened) {
+      auto frames =
+          std::make_unique<ReturnedFrames>(*opened, slots.size(), width, height, config.detector, watch.known());
+      frames->backend = std::move(opened);
+      return frames;
+    });
   }
 
-  ~Impl() { end(); }
+  ~Impl() {
+    end();
+    watch.stop_recovery();
+  }
 
   std::size_t most_in_frame(const DeviceFrame& device, int width, int height) const {
     if (!config.tracking) return device.most_in_frame();
     return device.most_in_frame(config.tracking->most_windows, config.tracking->most_share * width * height);
+  }
+
+  void count_memory() {
+    memory.slots = config.slots;
+    memory.frame_bytes = slots.front().device().geometry().frame_bytes();
+    memory.host_bytes = sizeof(Impl);
+    for (const Slot& slot : slots) {
+      for (const std::unique_ptr<DeviceFrame>& device : slot.devices) {
+        memory.device_bytes += device->device_bytes();
+        memory.host_bytes += device->host_bytes();
+      }
+      memory.host_bytes += sizeof(Slot) + slot.result.detections.capacity() * sizeof(Detection) +
+                           slot.result.bundles.capacity() * sizeof(BundlePose) +
+                           slot.result.disc_targets.capacity() * sizeof(DiscPose) +
+                           3 * slot.order.windows.capacity() * sizeof(SearchWindow);
+    }
   }
 
   /// Each backend has tables of its own where they are watched, so that one may be left for what happened to them.
@@ -136,30 +167,31 @@ struct Pipeline::Impl {
   /// Every slot is asked at start, on every backend.
   void begin_watch() {
     DeviceFrame& first = slots.front().device();
-    host_on(0).reserve(first, known_result, first.most_in_frame());
+    // All windows of a side at once may hold more than a frame's windows do.
+    for (const auto& host : hosts) host->reserve(first, known_result, first.most_in_frame());
     kept_pixels.resize(first.geometry().frame_bytes());
+    memory.host_bytes += kept_pixels.size();
     for (std::size_t b = 0; b < hosts.size(); ++b) {
-      std::vector<ConstantMemory> memory;
-      hosts[b]->list_constants(memory);
+      std::vector<ConstantMemory> constants;
+      hosts[b]->list_constants(constants);
       for (Slot& slot : slots) {
-        slot.devices[b]->list_constants(memory);
-        ask(slot, b);
+        slot.devices[b]->list_constants(constants);
+        ask(slot, b, 1, watch.known().parts());
       }
-      watch.watch(memory, static_cast<int>(b));
+      watch.watch(constants, static_cast<int>(b));
     }
   }
 
-  /// Runs the picture whose answer is known, over what the slot holds.
-  bool ask(Slot& slot, std::size_t backend) {
+  /// Runs the picture whose answer is known, over what the slot holds: the whole of it, and these parts of it.
+  bool ask(Slot& slot, std::size_t backend, std::size_t from, std::size_t to) {
     DeviceFrame& device = *slot.devices[backend];
-    pad_frame(watch.picture(), device.geometry(), device.pixels());
-    device.submit();
-    if (device.finish()) {
-      host_on(backend).finish(device, known_result);
-    } else {
-      HostFinish::give_up(known_result);
+    HostFinish& host = host_on(backend);
+    bool is_right = answers(device, host, watch.known(), 0, known_result);
+    for (std::size_t part = from; is_right && part < to; ++part) {
+      is_right = answers(device, host, watch.known(), part, known_result);
     }
-    return watch.answer(backend, known_result, monotonic_ns());
+    watch.answer(backend, is_right, known_result.status == FrameStatus::device_lost, monotonic_ns());
+    return is_right;
   }
 
   /// The same where it is due, or the backend has just taken over; the slot's frame stays.
@@ -168,7 +200,8 @@ struct Pipeline::Impl {
     asked = slot.on;
     u8* const pixels = slot.device().pixels();
     std::memcpy(kept_pixels.data(), pixels, kept_pixels.size());
-    const bool is_right = ask(slot, slot.on);
+    const std::size_t windows = watch.next_windows();
+    const bool is_right = ask(slot, slot.on, windows, windows == 0 ? 0 : windows + 1);
     std::memcpy(pixels, kept_pixels.data(), kept_pixels.size());
     return is_right;
   }
@@ -177,6 +210,31 @@ struct Pipeline::Impl {
   std::size_t active() const { return std::min(watch.active(), slots.front().devices.size() - 1); }
 
   Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
+
+  /// Whether the slot's frame is of the backend as it is now.
+  bool is_current(const Slot& slot, std::size_t backend) const {
+    return slot.origins[backend] == returned[backend].load(std::memory_order_acquire);
+  }
+
+  /// Gives a slot its frame on a backend that was opened anew. Called by whoever has the slot, which is at no frame
+  /// there; what it had stays until exchanged() is said.
+  ReturnedFrames* renew(Slot& slot, std::size_t backend) {
+    if (is_current(slot, backend)) return nullptr;
+    ReturnedFrames* const frames = returned[backend].load(std::memory_order_acquire);
+    std::swap(slot.devices[backend], frames->devices[static_cast<std::size_t>(slot.frame.slot)]);
+    slot.origins[backend] = frames;
+    return frames;
+  }
+
+  /// The host's thread, between two frames: has a backend take over again that has proven itself.
+  void go_back() {
+    auto* const frames = static_cast<ReturnedFrames*>(watch.proven());
+    if (frames == nullptr) return;
+    std::swap(hosts[frames->number], frames->host);
+    returned[frames->number].store(frames, std::memory_order_release);
+    asked = kNone;
+    watch.take_back(*frames);
+  }
 
   void start() {
     if (device_thread.joinable()) throw Error("the pipeline is running; stop it before it is started again");
@@ -238,10 +296,13 @@ struct Pipeline::Impl {
 
   void submit(Slot& slot, bool again) {
     const std::size_t to = active();
-    if (slot.on != to) {
+    if (slot.on != to || !is_current(slot, to)) {
+      DeviceFrame& before = slot.device();
+      ReturnedFrames* const renewed = renew(slot, to);
       DeviceFrame& next = *slot.devices[to];
-      pad_frame(slot.device().image(), next.geometry(), next.pixels());
+      pad_frame(before.image(), next.geometry(), next.pixels());
       slot.on = to;
+      if (renewed != nullptr) renewed->exchanged();
     }
     if (!again) slot.taken_ns = monotonic_ns();
     DeviceFrame& device = slot.device();
@@ -273,6 +334,7 @@ struct Pipeline::Impl {
 
   void finish(int i) {
     Slot& slot = at(i);
+    go_back();
     std::int64_t began_ns = make_result(i);
     if (tracker) {
       // What was lost in its windows is searched whole before any later result is looked at.
@@ -324,8 +386,10 @@ struct Pipeline::Impl {
     Slot& slot = at(i);
     while (slot.submitted) {
       const bool alive = slot.device().finish();
-      if (alive && watch.is_good(slot.on)) return true;
-      if (!alive) watch.lose(slot.on);
+      // Of a backend that was left, though the same one is back by now?
+      const bool is_of_now = is_current(slot, slot.on);
+      if (alive && is_of_now && watch.is_good(slot.on)) return true;
+      if (!alive && is_of_now) watch.lose(slot.on);
       if (watch.has_failed()) return false;
       count_one(run_again);
       ring.run_again(i);
@@ -365,16 +429,21 @@ struct Pipeline::Impl {
 
   const PipelineConfig config;
   const Deliver deliver;
+  /// Which backends can be believed; only the host's thread, which sees a loss, changes that. Before the slots: it has
+  /// the backends that were opened anew.
+  HealthWatch watch;
   std::vector<Slot> slots;
   std::vector<std::unique_ptr<HostFinish>> hosts;
   /// The device's thread asks it for windows, the host's thread gives it results; the ring keeps them apart.
   std::optional<Tracker> tracker;
   SlotRing ring;
-  /// Which backends can be believed; only the host's thread, which sees a loss, changes that.
-  HealthWatch watch;
+  /// By backend: the last that took over again, null before.
+  std::vector<std::atomic<ReturnedFrames*>> returned;
+  PipelineMemory memory;
   /// The host's thread's: of the known picture, and which backend was asked last.
   FrameResult known_result;
   std::vector<u8> kept_pixels;
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   std::size_t asked = 0;
   std::atomic<u64> run_again = 0, device_lost = 0;
   std::array<std::atomic<u64>, 2> late = {};
@@ -413,6 +482,7 @@ FrameSlot Pipeline::begin() {
   if (impl_->filling < 0) return {};
   Slot& slot = impl_->at(impl_->filling);
   slot.on = impl_->active();
+  if (ReturnedFrames* const renewed = impl_->renew(slot, slot.on)) renewed->exchanged();
   const MarkerGeometry& g = slot.device().geometry();
   return {{slot.device().pixels(), g.width, g.height, g.padded_width}, impl_->filling};
 }
@@ -456,22 +526,6 @@ const LatencyHistogram& Pipeline::times(Lap lap) const { return impl_->laps[stat
 
 HealthReport Pipeline::health() const { return impl_->watch.report(); }
 
-PipelineMemory Pipeline::memory() const {
-  PipelineMemory memory;
-  memory.slots = impl_->config.slots;
-  memory.frame_bytes = impl_->slots.front().devices.front()->geometry().frame_bytes();
-  memory.host_bytes = sizeof(Impl) + impl_->kept_pixels.size();
-  for (const Slot& slot : impl_->slots) {
-    for (const std::unique_ptr<DeviceFrame>& device : slot.devices) {
-      memory.device_bytes += device->device_bytes();
-      memory.host_bytes += device->host_bytes();
-    }
-    memory.host_bytes += sizeof(Slot) + slot.result.detections.capacity() * sizeof(Detection) +
-                         slot.result.bundles.capacity() * sizeof(BundlePose) +
-                         slot.result.disc_targets.capacity() * sizeof(DiscPose) +
-                         3 * slot.order.windows.capacity() * sizeof(SearchWindow);
-  }
-  return memory;
-}
+PipelineMemory Pipeline::memory() const { return impl_->memory; }
 
 }  // namespace berth

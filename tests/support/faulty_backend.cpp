@@ -11,6 +11,7 @@ struct FaultyPlan final : Plan {
   std::vector<std::unique_ptr<Plan>> plans;
   int replays = -1;  // the first is the empty frame that every DeviceFrame begins with
   int epoch = 0;
+  int number = 0;  // of all that were recorded
   void list_constants(std::vector<ConstantMemory>& to) const override {
     for (const auto& plan : plans) plan->list_constants(to);
   }
@@ -41,7 +42,8 @@ class FaultyStream final : public ForwardingStream {
     if (fault_.lose_frame >= 0 && frame >= fault_.lose_frame) lost_ = true;
     if (lost_) return;
     for (std::size_t i = 0; i < faulty.plans.size(); ++i) {
-      const bool flips = static_cast<int>(i) == fault_.flip_step && frame == fault_.flip_frame;
+      const bool flips = static_cast<int>(i) == fault_.flip_step && frame == fault_.flip_frame &&
+                         (fault_.flip_plan < 0 || fault_.flip_plan == faulty.number);
       if (flips && fault_.flip_before) flip(faulty.steps[i]);
       behind().replay(*faulty.plans[i]);
       if (flips && !fault_.flip_before) flip(faulty.steps[i]);
@@ -80,6 +82,7 @@ FaultyBackend::FaultyBackend(Backend& behind, const Fault& fault)
 std::unique_ptr<Plan> FaultyBackend::record(const std::vector<Step>& steps) {
   auto plan = std::make_unique<FaultyPlan>();
   plan->steps = steps;
+  plan->number = plans_++;
   for (const Step& step : steps) plan->plans.push_back(behind().record({step}));
   return plan;
 }

@@ -17,6 +17,8 @@ struct Fault {
   std::size_t flip_word = 0;
   int flip_bit = 0;
   int flip_frame = 0;
+  /// Of the plans in the order they were recorded, the one in which it does; any where negative.
+  int flip_plan = -1;
   /// The frame in which the device is lost for good; never where negative.
   int lose_frame = -1;
 };
@@ -31,6 +33,7 @@ class FaultyBackend final : public ForwardingBackend {
 
  private:
   Fault fault_;
+  int plans_ = 0;                   // recorded
   int epoch_ = 0;                   // of counting
   std::atomic<bool> lost_ = false;  // streams of several threads see it
 };
