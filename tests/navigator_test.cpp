@@ -8,8 +8,10 @@
 
 #include "berth/error.hpp"
 #include "navigation/candidates.hpp"
+#include "navigation/network_watch.hpp"
 #include "navigation/track.hpp"
 #include "navset/flight.hpp"
+#include "support/faulty_backend.hpp"
 #include "support/pictures.hpp"
 
 namespace berth {
@@ -204,6 +206,79 @@ Reading reading(int logit_q8, int x, int y, int d) {
 }
 
 constexpr TrackRules kRules = {256, 512, 1024, 3};  // doubt, most, believed, memory
+
+/// Asked before every look.
+HealthConfig always(std::size_t scrub_bytes) {
+  HealthConfig health;
+  health.known_answer_every_ns = 1;
+  health.scrub_bytes = scrub_bytes;
+  return health;
+}
+
+TEST(NetworkWatch, BelievesEveryBackend) {
+  for (const BackendStatus& status : probe_backends()) {
+    if (status.devices.empty()) continue;
+    const std::unique_ptr<Backend> backend = open_backend(status.name);
+    NavigatorPlans plans(*backend, read_network(kTiny), 160, 120);
+    NetworkWatch watch(always(100), plans);
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(watch.is_believed(plans)) << status.name;
+    EXPECT_EQ(watch.report().known_answers, 4u);
+    EXPECT_EQ(watch.report().mode, HealthMode::nominal);
+  }
+}
+
+TEST(NetworkWatch, FindsABitThatTurnsOver) {
+  const std::unique_ptr<Backend> backend = open_backend("simd");
+  NavigatorPlans plans(*backend, read_network(kTiny), 160, 120);
+  // By memory in its turn, and by what comes of it at once.
+  for (const bool scrubs : {true, false}) {
+    for (const std::vector<Buffer*>& layer : {plans.device.constants().front(), plans.device.constants().back()}) {
+      HealthConfig health = always(scrubs ? 4096 : 0);
+      if (scrubs) health.known_answer_every_ns = 0;
+      NetworkWatch watch(health, plans);
+      EXPECT_TRUE(watch.is_believed(plans));
+      // The sign of a channel's bias.
+      u32* const word = static_cast<u32*>(layer[1]->host());
+      *word ^= 0x01000000u;
+      bool believed = true;
+      const u64 around = 2 * watch.report().watched_bytes + 4096;
+      while (believed && watch.report().checked_bytes < around) believed = watch.is_believed(plans) && scrubs;
+      EXPECT_FALSE(watch.is_believed(plans));
+      EXPECT_STREQ(watch.report().reason, scrubs ? "network weights" : "a wrong known answer");
+      EXPECT_EQ(watch.report().alterations, scrubs ? 1u : 0u);
+      EXPECT_EQ(watch.report().mode, HealthMode::failed);
+      *word ^= 0x01000000u;
+      EXPECT_FALSE(watch.is_believed(plans)) << "what was wrong once is not believed again";
+    }
+  }
+  plans.network.logistic[7] ^= 4;
+  NetworkWatch watch(always(0), plans);
+  EXPECT_TRUE(watch.is_believed(plans)) << "which no sum goes by: it is for the memory's checks";
+}
+
+TEST(Navigator, IsNotBelievedOnceAPlanAnswersWrongly) {
+  const std::unique_ptr<Backend> simd = open_backend("simd");
+  NavigatorConfig config = tiny_config();
+  config.health = always(8192);
+  const GrayImage image = noise(160, 120, 5);
+  NavigatorPlans like(*simd, read_network(kTiny), 160, 120);
+  const std::array<const NetworkPlan*, 3> plans = {&like.search, &like.close, &like.follow};
+  for (int plan = 0; plan < 3; ++plan) {
+    // A sum, in the plan's second answer: the first, at start, is its replay -1.
+    test::Fault fault;
+    fault.flip_step = static_cast<int>(plans[static_cast<std::size_t>(plan)]->steps().size()) - 1;
+    fault.flip_argument = 3;
+    fault.flip_frame = 0;
+    fault.flip_plan = plan;
+    const auto faulty = test::make_faulty_backend(*simd, fault);
+    Navigator navigator(*faulty, 160, 120, config);
+    EXPECT_EQ(navigator.health().mode, HealthMode::nominal);
+    for (int look = 0; look < 2; ++look) EXPECT_EQ(navigator.look(image.view()).status, FrameStatus::device_lost);
+    EXPECT_EQ(navigator.health().mode, HealthMode::failed);
+    EXPECT_STREQ(navigator.health().reason, "a wrong known answer");
+    EXPECT_EQ(navigator.health().wrong_answers, 1u);
+  }
+}
 
 TEST(Track, IsBelievedByEvidenceOfSeveralFrames) {
   Track sure(kRules);

@@ -185,10 +185,20 @@ void add_flight(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--jobs", options->jobs, "flights at a time")->check(CLI::Range(1, 256))->capture_default_str();
   command->add_flag("--empty", options->empty, "without the target: how often something else is taken for it");
   command->add_option("--out", options->out, "folder for logs and pictures")->type_name("DIR")->capture_default_str();
+  command
+      ->add_option("--known-answer", options->known_answer_s,
+                   "with --fps: at start and every so many seconds pictures with known answers, for marker and network "
+                   "each, memory checked all the while (docs/reliability.md); 0 for none")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   command->footer(kExamples);
   command->callback([options, &console, &exit_code] {
     if (options->pace.fps != 0 && (options->count != 1 || options->empty)) {
       throw Error("--fps plays one flight; leave --count and --empty out");
+    }
+    if (options->known_answer_s > 0 && options->pace.fps == 0) {
+      throw Error("--known-answer is for flights that are played; give --fps, too");
     }
     exit_code = options->count == 1 && !options->empty ? show_flight(*options, console) : fly_many(*options, console);
   });

@@ -129,6 +129,14 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
       ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
+  command
+      ->add_option(
+          "--hang-after", options->stream.hang_ms,
+          "at a camera's pace: a device that a frame is waited for longer than this gives way to --fallback as "
+          "one that is lost; 0 waits for as long as it takes")
+      ->type_name("MS")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
   add_record_options(*command, options->record);
   add_report_option(*command, options->web);
   add_view_options(*command, options->web);

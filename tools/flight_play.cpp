@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include "berth/error.hpp"
 #include "berth/pilot_stream.hpp"
 #include "camera/bad_input.hpp"
+#include "health_show.hpp"
 #include "pipeline_show.hpp"
 
 namespace berth::cli {
@@ -105,9 +107,13 @@ void describe(const NavigationChoice& choice, const NavigationOptions& options, 
 
 PlayedFlight play_flight(const navset::Flight& flight, const FlightOptions& options, Console& console,
                          const FlightWatcher& seen) {
-  const PilotConfig pilot = flight_pilot(flight_network(options));
+  PilotConfig pilot = flight_pilot(flight_network(options));
   PilotStreamConfig config;
   config.pipeline = make_pipeline_config(options.pace, pilot.detector);
+  if (options.known_answer_s > 0) {
+    config.pipeline.health.emplace().known_answer_every_ns = std::llround(options.known_answer_s * 1e9);
+    pilot.navigator.health = config.pipeline.health;
+  }
   config.pilot = pilot;
   const EngineBackends docking = open_chosen_backends(options.engine);
   std::vector<Backend*> chain;
@@ -158,8 +164,15 @@ PlayedFlight play_flight(const navset::Flight& flight, const FlightOptions& opti
   out << "the network at rest:  ";
   print_late(out, options.pace.deadlines_ms, counts.alone.late, counts.alone.frames);
   out << fmt::format("{} looks of the network, {} of them late", counts.looks, counts.late_looks);
-  if (counts.lost_looks > 0) out << "; its device was lost";
+  const HealthReport network = stream.network_health();
+  if (counts.lost_looks > 0)
+    out << "; it was left: " << (*network.reason == '\0' ? "its device was lost" : network.reason);
   out << '\n';
+  print_health(out, stream.pipeline().health());
+  if (network.known_answers > 0) {
+    out << "the network's ";
+    print_health(out, network);
+  }
   played.counts = to_json(stream.pipeline(), options.pace.deadlines_ms);
   played.counts["fps"] = options.pace.fps;
   played.counts["network"] = {{"backend", choice.backend},

@@ -20,6 +20,8 @@ struct FlightOptions {
   NavigationOptions navigation;
   /// In real time, through a PilotStream; not with fps 0.
   PaceOptions pace;
+  /// As StreamOptions, with a pace.
+  double known_answer_s = 0;
   std::uint64_t seed = 1;
   int frames = 240;
 };

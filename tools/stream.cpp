@@ -166,6 +166,7 @@ class StreamRun {
   PipelineConfig pipeline_config(const DetectorConfig& detector) const {
     PipelineConfig config = make_pipeline_config(options_.pace, detector, tracking());
     config.health = health();
+    config.hang_ns = std::llround(options_.hang_ms * 1e6);
     return config;
   }
 

@@ -36,6 +36,8 @@ struct StreamOptions {
   double known_answer_s = 0;
   /// A backend that was left is tried again after so many seconds; 0: never.
   double fail_back_s = 0;
+  /// Through a pipeline: a device that a frame is waited for longer is left, ms; 0 waits for as long as it takes.
+  double hang_ms = 0;
   /// In real time, through a pipeline.
   PaceOptions pace;
   /// They get every frame, whichever way it took.

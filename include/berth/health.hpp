@@ -56,8 +56,8 @@ struct HealthConfig {
 struct HealthReport {
   /// nominal, fallback or failed.
   HealthMode mode = HealthMode::nominal;
-  /// Why a backend was left last: "its device was lost", "a wrong known answer", or the memory that was altered, such
-  /// as "code book"; empty where none was.
+  /// Why a backend was left last: "its device was lost", "its device hangs", "a wrong known answer", or the memory that
+  /// was altered, such as "code book"; empty where none was.
   const char* reason = "";
   u64 known_answers = 0, wrong_answers = 0;
   /// Memory under watch, bytes checked since the start, and alterations found.

@@ -8,6 +8,7 @@
 #include "berth/backend.hpp"
 #include "berth/camera.hpp"
 #include "berth/frame.hpp"
+#include "berth/health.hpp"
 #include "berth/image.hpp"
 
 namespace berth {
@@ -34,6 +35,10 @@ struct NavigatorConfig {
   /// One standard deviation of the range, as a share of it: 68 % of the errors of the network that comes with Berth lie
   /// within (models/README.md).
   double range_deviation = 0.12;
+  /// With it, weights and tables in the host's memory are checked before each look, and now and then all plans run on a
+  /// picture of which the reference's sums are known. Once either fails, every look is device_lost; its recovery is not
+  /// used.
+  std::optional<HealthConfig> health;
 };
 
 /// What the network says of a frame.
@@ -77,6 +82,9 @@ class Navigator {
   void forget();
   /// Makes the next frame look here first: a target's centre and diameter, px of the frame.
   void expect(double x_px, double y_px, double d_px);
+
+  /// nominal or failed; from any thread.
+  HealthReport health() const;
 
   /// Bytes of device memory, all taken at start.
   std::size_t device_bytes() const;

@@ -74,6 +74,8 @@ class PilotStream {
 
   /// At any time, from any thread.
   PilotStreamCounts counts() const;
+  /// Of the network, where NavigatorConfig::health is given: once failed, it is not asked again.
+  HealthReport network_health() const;
 
  private:
   struct Impl;

@@ -42,6 +42,9 @@ struct PipelineConfig {
   /// in a frame's place on its slot, before that frame's result goes out: what a backend that fails made of it, nobody
   /// gets, and it is run again on the next. Meanwhile frames wait, or are dropped and counted.
   std::optional<HealthConfig> health;
+  /// A device that a frame is waited for longer than this is left as one that is lost, ns; 0 waits for as long as it
+  /// takes. Longer than the slowest frame by far: drivers may compile at a first one. For backends with a device.
+  std::int64_t hang_ns = 0;
 };
 
 /// The parts of a frame's way, timed.

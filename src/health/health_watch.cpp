@@ -6,9 +6,8 @@
 #include "berth/error.hpp"
 
 namespace berth {
-namespace {
 
-HealthConfig checked(const HealthConfig& config) {
+const HealthConfig& checked_health(const HealthConfig& config) {
   if (config.known_answer_every_ns < 0) {
     throw Error("a known answer every " + std::to_string(config.known_answer_every_ns) +
                 " ns; give more than 0, or 0 for the start alone");
@@ -16,13 +15,11 @@ HealthConfig checked(const HealthConfig& config) {
   return config;
 }
 
-}  // namespace
-
 HealthWatch::HealthWatch(const std::optional<HealthConfig>& config, int width, int height,
                          const DetectorConfig& detector, std::size_t backends)
     : scrubs_(backends + 1), good_(backends, 1) {
   if (!config) return;
-  config_ = checked(*config);
+  config_ = checked_health(*config);
   known_ = std::make_unique<KnownAnswer>(width, height, detector);
   if (config_.scrub_bytes > 0) watch(program_memory(), MemoryScrub::kShared);
 }

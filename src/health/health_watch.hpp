@@ -12,6 +12,9 @@
 
 namespace berth {
 
+/// The configuration itself. Throws Error where it is out of bounds.
+const HealthConfig& checked_health(const HealthConfig& config);
+
 /// Which of several backends can still be believed, by what was lost, answered and found in memory. Counts may be read
 /// by any thread; all else is one thread's. Allocates nothing after start.
 class HealthWatch {
@@ -42,6 +45,7 @@ class HealthWatch {
   /// The next slice of memory.
   void scrub();
   void lose(std::size_t backend) { leave(backend, "its device was lost"); }
+  void note_hang(std::size_t backend) { leave(backend, "its device hangs"); }
 
   bool is_good(std::size_t backend) const { return good_[backend]; }
   /// The first that can be believed; how many backends there are where none can.

@@ -7,8 +7,9 @@
 #include "berth/error.hpp"
 #include "divide_up.hpp"
 #include "navigation/candidates.hpp"
+#include "navigation/navigator_plans.hpp"
 #include "navigation/network_output.hpp"
-#include "navigation/network_plan.hpp"
+#include "navigation/network_watch.hpp"
 #include "navigation/track.hpp"
 
 namespace berth {
@@ -17,17 +18,8 @@ namespace {
 constexpr int kMinSide = 64;
 constexpr int kMaxSide = 16384;
 
-/// The search sees the frame this high, px: what is smaller than 40 px there is not what the network was trained on.
-constexpr int kSearchHeight = 480;
-/// The target's middle may be this far from a window's for the network to know it, search px.
-constexpr int kReach = 32;
-/// Places looked at closely in one frame.
-constexpr int kCloseLooks = 3;
 /// The size of the target in a window that is laid around it, px.
 constexpr int kWindowDiameter = 96;
-
-constexpr int kMinStep = 256;
-constexpr int kMaxStep = 2560;
 
 /// Further windows around a place that one window is not sure of are so many of their px off it, right down and left
 /// up.
@@ -42,49 +34,16 @@ constexpr int kDoubtFrames = 2;
 /// Log-odds in 1/256.
 int q8(double log_odds) { return static_cast<int>(log_odds * 256); }
 
-int search_step(int height) { return std::clamp(height * 256 / kSearchHeight, kMinStep, kMaxStep); }
-
-/// Length of the search's window: grid positions from kReach before the frame's first pixel to kReach after its last.
-int search_length(int frame, int step, int side, int spacing) {
-  const int seen = (frame * 256 + step - 1) / step;
-  return side + std::max(0, round_up(seen - 2 * kReach, spacing));
-}
-
 }  // namespace
 
-struct Navigator::Impl {
+struct Navigator::Impl : NavigatorPlans {
   Impl(Backend& backend_, int width_, int height_, const NavigatorConfig& config_)
-      : backend(backend_),
-        width(width_),
-        height(height_),
+      : NavigatorPlans(backend_, read_network(config_.network), width_, height_),
         config(config_),
-        network(read_network(config_.network)),
-        device(backend_, network),
-        padded_width(round_up(width_, 4)),
-        padded(static_cast<std::size_t>(padded_width) * static_cast<std::size_t>(height_)),
-        frame(backend_.make_buffer(padded.size())),
-        step(search_step(height_)),
-        spacing(position_spacing(network)),
-        search(device, view(), 1, search_length(width_, step, network.side, spacing),
-               search_length(height_, step, network.side, spacing)),
-        close(device, view(), kCloseLooks, network.side, network.side),
-        follow(device, view(), 1, network.side, network.side),
-        stream(backend_.make_stream()),
-        whole{search_corner(width_, search.width()), search_corner(height_, search.height()), step, 0},
-        search_sums(search.sums().bytes() / 4),
-        close_sums(close.sums().bytes() / 4),
         candidates(static_cast<std::size_t>(search.grid_width() * search.grid_height())),
         track({q8(config_.doubt), q8(config_.most_evidence), q8(config_.evidence), kMemoryFrames}) {
     readings.reserve(kCloseLooks + 1);
-    upload_at_start(backend_, *stream, search.windows(), whole.data(), sizeof whole);
-  }
-
-  FrameView view() const { return {frame.get(), width, height, padded_width}; }
-
-  bool run(NetworkPlan& plan, std::vector<s32>& sums) {
-    stream->replay(plan.plan());
-    stream->download(plan.sums(), sums.data(), plan.sums().bytes());
-    return stream->finish();
+    if (config.health) watch = std::make_unique<NetworkWatch>(*config.health, *this);
   }
 
   /// The window of the network's side around a place of the frame: the target `diameter` px wide in it, its middle
@@ -185,9 +144,6 @@ struct Navigator::Impl {
     return true;
   }
 
-  /// Of a window of `length` search px in the middle of the frame.
-  s32 search_corner(int frame_length, int length) const { return (frame_length * 256 - length * step) / 2; }
-
   void measure() {
     sighting.has_range = false;
     if (!config.camera || sighting.status != FrameStatus::ok) return;
@@ -203,28 +159,12 @@ struct Navigator::Impl {
     sighting.has_range = true;
   }
 
-  Backend& backend;
-  int width;
-  int height;
   NavigatorConfig config;
-  Network network;
-  DeviceNetwork device;
-  int padded_width;
-  std::vector<u8> padded;
-  std::unique_ptr<Buffer> frame;
-  int step;
-  int spacing;
-  NetworkPlan search;
-  NetworkPlan close;
-  NetworkPlan follow;
-  std::unique_ptr<Stream> stream;
-  std::array<s32, 4> whole;  // the search's window
-  std::vector<s32> search_sums;
-  std::vector<s32> close_sums;
   std::vector<Candidate> candidates;
   std::vector<Reading> readings;
   Track track;
   Sighting sighting;
+  std::unique_ptr<NetworkWatch> watch;  // where there is a HealthConfig
 };
 
 Navigator::Navigator(Backend& backend, int width, int height, const NavigatorConfig& config) {
@@ -259,6 +199,11 @@ const Sighting& Navigator::look(View2D<const u8> image, const FrameStamp& stamp)
                 " for a navigator of " + std::to_string(it.width) + "x" + std::to_string(it.height));
   }
   sighting.stamp = stamp;
+  if (it.watch && !it.watch->is_believed(it)) {
+    sighting.status = FrameStatus::device_lost;
+    sighting.tracked = sighting.doubted = sighting.has_range = false;
+    return sighting;
+  }
   for (int y = 0; y < it.height; ++y) {
     std::memcpy(it.padded.data() + static_cast<std::ptrdiff_t>(y) * it.padded_width, image.row(y),
                 static_cast<std::size_t>(it.width));
@@ -282,6 +227,8 @@ const Sighting& Navigator::look(View2D<const u8> image, const FrameStamp& stamp)
   it.measure();
   return sighting;
 }
+
+HealthReport Navigator::health() const { return impl_->watch ? impl_->watch->report() : HealthReport(); }
 
 void Navigator::forget() { impl_->track.give_up(); }
 

@@ -47,6 +47,7 @@ class NetworkPlan {
 
   Plan& plan() { return *plan_; }
   const std::vector<Step>& steps() const { return steps_; }
+  void list_constants(std::vector<ConstantMemory>& to) const { plan_->list_constants(to); }
   /// s32[windows, 4]: x, y of the corner and step in 1/256 px of the frame, 0; to be uploaded before a replay.
   Buffer& windows() { return *windows_; }
   /// s32[windows, grid_height, grid_width, sums_each]: what network_output reads.

@@ -31,6 +31,8 @@ class NetworkThread {
   bool is_free() const;
   /// Whether it is at work, or was at any time since; ns, monotonic.
   bool was_at_work_since(std::int64_t ns) const;
+  /// The navigator's; from any thread.
+  HealthReport health() const { return navigator_.health(); }
   /// Copies the image.
   void give(View2D<const u8> image, const FrameStamp& stamp, const std::optional<Expectation>& expected);
   /// Takes the word on the frame that was given, if it is there, or waiting for it. Throws what the look has thrown.

@@ -145,6 +145,8 @@ FrameSlot PilotStream::begin() { return impl_->pipeline.begin(); }
 bool PilotStream::commit(const FrameStamp& stamp) { return impl_->pipeline.commit(stamp); }
 const Pipeline& PilotStream::pipeline() const { return impl_->pipeline; }
 
+HealthReport PilotStream::network_health() const { return impl_->network.health(); }
+
 PilotStreamCounts PilotStream::counts() const {
   const Impl& it = *impl_;
   return {it.looks, it.late_looks, it.lost_looks, it.beside_network.plain(), it.alone.plain()};

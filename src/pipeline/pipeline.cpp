@@ -48,6 +48,10 @@ PipelineConfig checked(PipelineConfig config, int width, int height) {
     throw Error(std::to_string(config.cores.size()) +
                 " cores for a pipeline's threads; give two, the device's and the host's, or one for both");
   }
+  if (config.hang_ns < 0) {
+    throw Error("a device that hangs after " + std::to_string(config.hang_ns) +
+                " ns; give more than 0, or 0 for never");
+  }
   for (const std::int64_t deadline : config.deadlines_ns) {
     if (deadline <= 0) throw Error("a deadline of " + std::to_string(deadline) + " ns; give more than 0");
   }
@@ -118,6 +122,7 @@ struct Pipeline::Impl {
       slot.tracked.result = &slot.result;
       slot.frame.tracked = &slot.tracked;
     }
+    make_waiters();
     count_memory();
     if (watch.is_on()) begin_watch();
     ring.close();  // until start: a frame that nobody takes would stand in no count
@@ -125,6 +130,7 @@ struct Pipeline::Impl {
       auto frames =
           std::make_unique<ReturnedFrames>(*opened, slots.size(), width, height, config.detector, watch.known());
       frames->backend = std::move(opened);
+      if (!waiters.empty()) frames->waiter = std::make_shared<DeviceWaiter>();
       return frames;
     });
   }
@@ -132,6 +138,8 @@ struct Pipeline::Impl {
   ~Impl() {
     end();
     watch.stop_recovery();
+    // Before the frames that they may still be at.
+    for (const auto& waiter : all_waiters) waiter->end();
   }
 
   std::size_t most_in_frame(const DeviceFrame& device, int width, int height) const {
@@ -186,9 +194,10 @@ struct Pipeline::Impl {
   bool ask(Slot& slot, std::size_t backend, std::size_t from, std::size_t to) {
     DeviceFrame& device = *slot.devices[backend];
     HostFinish& host = host_on(backend);
-    bool is_right = answers(device, host, watch.known(), 0, known_result);
+    const auto finish = [this, backend](DeviceFrame& frame) { return finish_on(backend, frame); };
+    bool is_right = answers(device, host, watch.known(), 0, known_result, finish);
     for (std::size_t part = from; is_right && part < to; ++part) {
-      is_right = answers(device, host, watch.known(), part, known_result);
+      is_right = answers(device, host, watch.known(), part, known_result, finish);
     }
     watch.answer(backend, is_right, known_result.status == FrameStatus::device_lost, monotonic_ns());
     return is_right;
@@ -210,6 +219,29 @@ struct Pipeline::Impl {
   std::size_t active() const { return std::min(watch.active(), slots.front().devices.size() - 1); }
 
   Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
+
+  /// A thread that waits for each device, where one may hang. Their list never grows while frames fly.
+  void make_waiters() {
+    if (config.hang_ns == 0) return;
+    const std::size_t backends = slots.front().devices.size();
+    const bool recovers = config.health && config.health->recovery;
+    const int returns = recovers ? std::max(0, config.health->recovery->most_returns) : 0;
+    all_waiters.reserve(backends * (1 + static_cast<std::size_t>(returns)));
+    for (std::size_t i = 0; i < backends; ++i) all_waiters.push_back(std::make_shared<DeviceWaiter>());
+    waiters = all_waiters;
+  }
+
+  /// Waits for a frame on a backend as it is now, which is left where it is lost or hangs. Whether it came.
+  bool finish_on(std::size_t backend, DeviceFrame& device) {
+    using End = DeviceWaiter::End;
+    const bool is_plain = waiters.empty() || device.stream().is_immediate();
+    const End end = !is_plain         ? waiters[backend]->finish(device, config.hang_ns)
+                    : device.finish() ? End::done
+                                      : End::lost;
+    if (end == End::lost) watch.lose(backend);
+    if (end == End::hangs) watch.note_hang(backend);
+    return end == End::done;
+  }
 
   /// Whether the slot's frame is of the backend as it is now.
   bool is_current(const Slot& slot, std::size_t backend) const {
@@ -233,6 +265,10 @@ struct Pipeline::Impl {
     std::swap(hosts[frames->number], frames->host);
     returned[frames->number].store(frames, std::memory_order_release);
     asked = kNone;
+    if (!waiters.empty()) {
+      std::swap(waiters[frames->number], frames->waiter);
+      all_waiters.push_back(waiters[frames->number]);
+    }
     watch.take_back(*frames);
   }
 
@@ -385,11 +421,8 @@ struct Pipeline::Impl {
   bool wait_for_device(int i) {
     Slot& slot = at(i);
     while (slot.submitted) {
-      const bool alive = slot.device().finish();
-      // Of a backend that was left, though the same one is back by now?
-      const bool is_of_now = is_current(slot, slot.on);
-      if (alive && is_of_now && watch.is_good(slot.on)) return true;
-      if (!alive && is_of_now) watch.lose(slot.on);
+      // Not of a backend that was left, though the same one is back by now.
+      if (is_current(slot, slot.on) && finish_on(slot.on, slot.device()) && watch.is_good(slot.on)) return true;
       if (watch.has_failed()) return false;
       count_one(run_again);
       ring.run_again(i);
@@ -434,6 +467,8 @@ struct Pipeline::Impl {
   HealthWatch watch;
   std::vector<Slot> slots;
   std::vector<std::unique_ptr<HostFinish>> hosts;
+  /// By backend, the host's thread's; and all there ever were.
+  std::vector<std::shared_ptr<DeviceWaiter>> waiters, all_waiters;
   /// The device's thread asks it for windows, the host's thread gives it results; the ring keeps them apart.
   std::optional<Tracker> tracker;
   SlotRing ring;

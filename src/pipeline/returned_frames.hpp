@@ -6,19 +6,22 @@
 
 #include "frame/detector_parts.hpp"
 #include "health/health_watch.hpp"
+#include "pipeline/device_waiter.hpp"
 
 namespace berth {
 
-/// Runs a part of the known picture on a frame, over what that holds; whether the answer is right.
-inline bool answers(DeviceFrame& device, HostFinish& host, const KnownAnswer& known, std::size_t part,
-                    FrameResult& result) {
+/// Runs a part of the known picture on a frame, over what that holds; whether the answer is right. `finish` waits for
+/// it, and returns whether it came.
+template <class Finish>
+bool answers(DeviceFrame& device, HostFinish& host, const KnownAnswer& known, std::size_t part, FrameResult& result,
+             const Finish& finish) {
   if (known.windows(part).empty()) {
     pad_frame(known.image(), device.geometry(), device.pixels());
     device.submit();
   } else {
     device.submit_windows(known.image(), known.windows(part));
   }
-  if (device.finish()) {
+  if (finish(device)) {
     host.finish(device, result);
   } else {
     HostFinish::give_up(result);
@@ -46,13 +49,15 @@ class ReturnedFrames final : public Returned {
   bool is_right() override {
     for (const auto& device : devices) {
       for (std::size_t part = 0; part < known_.parts(); ++part) {
-        if (!answers(*device, *host, known_, part, result_)) return false;
+        if (!answers(*device, *host, known_, part, result_, [](DeviceFrame& it) { return it.finish(); })) return false;
       }
     }
     return true;
   }
   bool is_settled() const override { return exchanged_.load(std::memory_order_acquire) == devices.size(); }
   void free_displaced() override {
+    if (waiter) waiter->end();
+    waiter.reset();
     for (auto& device : devices) device.reset();
     host.reset();
   }
@@ -61,6 +66,8 @@ class ReturnedFrames final : public Returned {
 
   std::vector<std::unique_ptr<DeviceFrame>> devices;  // by slot
   std::unique_ptr<HostFinish> host;
+  /// Shared with the pipeline, which ends it too; null where devices are waited for as long as it takes.
+  std::shared_ptr<DeviceWaiter> waiter;
 
  private:
   const KnownAnswer& known_;

@@ -1,5 +1,7 @@
 // The files that Berth reads, but for recordings. A file that is read holds what its reader promises.
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -8,7 +10,12 @@
 #include "berth/disc_target.hpp"
 #include "berth/error.hpp"
 #include "berth/systematic_covariance.hpp"
+#include "camera/aravis_camera.hpp"
+#include "camera/gst_camera.hpp"
 #include "camera/image_file.hpp"
+#include "camera/recorded_frame.hpp"
+#include "camera/ros_image.hpp"
+#include "camera/v4l2_camera.hpp"
 #include "crc32.hpp"
 #include "fuzz/targets.hpp"
 #include "navigation/network.hpp"
@@ -83,6 +90,43 @@ void network_file(const u8* bytes, std::size_t count) {
   put(12, static_cast<u32>(count));
   put(count - 4, crc32(file.data(), count - 4));
   parse_bytes(file);
+}
+
+/// What berth run writes of a frame in a recording, and of its camera.
+void recorded_text(const u8* bytes, std::size_t count) {
+  const std::string text(reinterpret_cast<const char*>(bytes), count);
+  const auto answers = [](const auto& read) {
+    try {
+      read();
+    } catch (const Error&) {
+    }
+  };
+  answers([&] { read_recorded_camera(text, "recording"); });
+  answers([&] { read_recorded_frame(text, "recording"); });
+}
+
+/// A message with a picture, as others record it: packed, or as a PNG's or JPEG's bytes.
+void recorded_image(const u8* bytes, std::size_t count) {
+  if (count == 0) return;
+  const std::unique_ptr<u8[]> message(new u8[count - 1]);  // of its own size, so that a byte beyond it is noticed
+  std::copy_n(bytes + 1, count - 1, message.get());
+  try {
+    const RosImage read = read_ros_image(message.get(), count - 1, (bytes[0] & 1) != 0, "recording");
+    require(read.image.width() > 0 && read.image.height() > 0, "an image that is read has a size");
+  } catch (const Error&) {
+  }
+}
+
+/// A camera as it is named on the command line.
+void source_options(const u8* bytes, std::size_t count) {
+  const std::string text(reinterpret_cast<const char*>(bytes), count);
+  for (const auto parse : {+[](const std::string& t) { parse_v4l2(t); }, +[](const std::string& t) { parse_aravis(t); },
+                           +[](const std::string& t) { parse_gst(t); }}) {
+    try {
+      parse(text);
+    } catch (const Error&) {
+    }
+  }
 }
 
 void image_file(const u8* bytes, std::size_t count) {

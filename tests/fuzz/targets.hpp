@@ -24,6 +24,9 @@ struct Target {
 
 const std::vector<Target>& targets();
 
+/// The one of that name; null where there is none.
+const Target* find_target(const char* name);
+
 /// Ends the program, saying why; for what must hold whatever the input.
 inline void require(bool holds, const char* what) {
   if (holds) return;
@@ -38,6 +41,9 @@ void scenario_file(const u8* bytes, std::size_t count);
 void machine_file(const u8* bytes, std::size_t count);
 void network_file(const u8* bytes, std::size_t count);
 void recording_file(const u8* bytes, std::size_t count);
+void recorded_text(const u8* bytes, std::size_t count);
+void recorded_image(const u8* bytes, std::size_t count);
+void source_options(const u8* bytes, std::size_t count);
 void image_file(const u8* bytes, std::size_t count);
 void camera_pixels(const u8* bytes, std::size_t count);
 void marker_frame(const u8* bytes, std::size_t count);

@@ -1,0 +1,50 @@
+#include "pipeline/device_waiter.hpp"
+
+#include <chrono>
+
+#include "pipeline/thread_setup.hpp"
+
+namespace berth {
+
+DeviceWaiter::DeviceWaiter() : thread_([this] { work(); }) {}
+
+void DeviceWaiter::end() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ending_ = true;
+    given_.notify_one();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void DeviceWaiter::work() {
+  name_thread("berth-wait");
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    given_.wait(lock, [this] { return frame_ != nullptr || ending_; });
+    if (frame_ == nullptr) return;
+    DeviceFrame& frame = *frame_;
+    lock.unlock();
+    bool is_alive = false;
+    try {
+      is_alive = frame.finish();
+    } catch (...) {
+      is_alive = false;  // a backend that throws here is no use to anyone
+    }
+    lock.lock();
+    is_alive_ = is_alive;
+    frame_ = nullptr;
+    ended_.notify_one();
+  }
+}
+
+DeviceWaiter::End DeviceWaiter::finish(DeviceFrame& frame, std::int64_t most_ns) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (hangs_) return End::hangs;
+  frame_ = &frame;
+  given_.notify_one();
+  hangs_ = !ended_.wait_for(lock, std::chrono::nanoseconds(most_ns), [this] { return frame_ == nullptr; });
+  return hangs_ ? End::hangs : is_alive_ ? End::done : End::lost;
+}
+
+}  // namespace berth
