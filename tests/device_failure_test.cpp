@@ -88,11 +88,8 @@ void fly_both(const Faulty& device) {
 #ifdef BERTH_WITH_CUDA
 TEST(DeviceFailure, OfCudaCostsNoFrame) {
   FakeDriver driver("current");
-  fly_both({[] { return open_backend("cuda"); },
-            [&] { driver.fake_cuda_lose_at_kernel(1); },
-            [&] {
-              driver.fake_cuda_hold(true);
-            },
+  fly_both({[] { return open_backend("cuda"); }, [&] { driver.fake_cuda_lose_at_kernel(1); },
+            [&] { driver.fake_cuda_hold(true); },
             [&] {
               driver.fake_cuda_hold(false);
               driver.fake_cuda_reset();
@@ -131,8 +128,7 @@ TEST(DeviceFailure, OfVulkanCostsNoFrame) {
     HeldFences::real = api.vkWaitForFences;
     api.vkWaitForFences = &HeldFences::wait;
   };
-  fly_both({[&] { return vulkan::open({}, instruments); },
-            [] { Submit::fail_after(0, VK_ERROR_DEVICE_LOST); },
+  fly_both({[&] { return vulkan::open({}, instruments); }, [] { Submit::fail_after(0, VK_ERROR_DEVICE_LOST); },
             [] { HeldFences::hold(true); },
             [] {
               HeldFences::hold(false);
@@ -152,9 +148,7 @@ TEST(DeviceFailure, OfOpenclCostsNoFrame) {
   for (const BackendStatus& status : probe_backends()) {
     if (status.name == "opencl" && status.devices.empty()) GTEST_SKIP() << status.absent;
   }
-  fly_both({[] { return open_backend("opencl"); },
-            [&] { lose(1); },
-            [&] { hold(1); },
+  fly_both({[] { return open_backend("opencl"); }, [&] { lose(1); }, [&] { hold(1); },
             [&] {
               lose(0);
               hold(0);

@@ -9,6 +9,7 @@
 
 #include "berth/error.hpp"
 #include "support/complaint.hpp"
+#include "support/pictures.hpp"
 #include "support/web_client.hpp"
 #include "web_assets.hpp"
 
@@ -94,6 +95,34 @@ TEST(WebAddress, IsReadInEveryForm) {
     EXPECT_THAT(test::complaint([&] { parse_web_address(wrong); }),
                 testing::AllOf(StartsWith(std::string("--view ") + wrong), HasSubstr("e.g. 127.0.0.1:8040")));
   }
+}
+
+TEST_F(WebServerTest, OutlivesRequestsThatAreCutOffOrDamaged) {
+  const std::string host = " HTTP/1.1\r\nHost: localhost\r\n";
+  const std::vector<std::string> whole = {
+      "GET /state.json" + host + "Accept: */*\r\n\r\n",
+      "GET /" + host + "Range: bytes=0-9,20-\r\nAccept-Encoding: gzip, br\r\nConnection: close\r\n\r\n",
+      "GET /times.json?from=3&to=%34" + host + "If-None-Match: \"x\"\r\n\r\n",
+      "POST /control" + host + "Authorization: Bearer " + kToken + "\r\nContent-Length: 4\r\n\r\nstop",
+      "POST /control" + host + "Transfer-Encoding: chunked\r\n\r\n4\r\nstop\r\n0\r\n\r\n",
+      "POST /control" + host +
+          "Content-Type: multipart/form-data; boundary=b\r\nContent-Length: 62\r\n\r\n--b\r\nContent-Disposition: "
+          "form-data; name=\"a\"\r\n\r\nstop\r\n--b--\r\n"};
+  pictures::Random random(11);
+  for (int i = 0; i < 240; ++i) {
+    std::string request = whole[static_cast<std::size_t>(i) % whole.size()];
+    const auto some = [&](std::size_t below) {
+      return static_cast<std::size_t>(random.below(static_cast<int>(below)));
+    };
+    if (i % 3 == 0) request.resize(some(request.size()));
+    for (int k = 0; k < i % 4 && !request.empty(); ++k) request[some(request.size())] = static_cast<char>(some(256));
+    if (i % 7 == 0) request.insert(some(request.size() + 1), some(3000), static_cast<char>('!' + some(90)));
+    const std::string answer = answer_to(port, request);
+    EXPECT_THAT(answer, testing::AnyOf(testing::IsEmpty(), StartsWith("HTTP/1.1 "))) << i;
+    EXPECT_THAT(answer, Not(StartsWith("HTTP/1.1 5"))) << i;
+  }
+  EXPECT_THAT(answer_to_get(port, "/state.json"), StartsWith("HTTP/1.1 200"));
+  EXPECT_EQ(ended, 0);
 }
 
 TEST_F(WebServerTest, HandsOutThePageAndWhatItNeeds) {

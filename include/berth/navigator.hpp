@@ -36,8 +36,8 @@ struct NavigatorConfig {
   /// within (models/README.md).
   double range_deviation = 0.12;
   /// With it, weights and tables in the host's memory are checked before each look, and now and then all plans run on a
-  /// picture of which the reference's sums are known. Once either fails, every look is device_lost; its recovery is not
-  /// used.
+  /// picture of which the `cpu` backend's sums are known. Once either fails, every look is device_lost; its recovery is
+  /// not used.
   std::optional<HealthConfig> health;
 };
 

@@ -17,8 +17,8 @@ class NetworkWatch {
   /// Of the sums of the search, the close looks and the look that follows.
   using Answer = std::array<u32, 3>;
 
-  /// Runs the picture on the reference backend, with all the plans' memory for that time, and then on these. Throws
-  /// Error on a configuration out of bounds.
+  /// Runs the picture on the `cpu` backend, with all the plans' memory for that time, and then on these: seconds with a
+  /// large network. Throws Error on a configuration out of bounds.
   NetworkWatch(const HealthConfig& config, NavigatorPlans& plans);
 
   /// Checks the next slice of memory, and where it is due runs the picture over what the plans hold. False for good

@@ -9,7 +9,8 @@
 
 namespace berth {
 
-/// Waits for one backend's device on a thread of its own: one that hangs in its driver holds up that thread, not frames.
+/// Waits for one backend's device on a thread of its own: one that hangs in its driver holds up that thread, not
+/// frames.
 class DeviceWaiter {
  public:
   enum class End { done, lost, hangs };

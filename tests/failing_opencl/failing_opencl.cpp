@@ -1,5 +1,5 @@
-// The OpenCL loader, but for two functions that fail or block when a test wants them to. All else is found in the loader,
-// which this library is linked with.
+// The OpenCL loader, but for two functions that fail or block when a test wants them to. All else is found in the
+// loader, which this library is linked with.
 #include <CL/cl.h>
 #include <dlfcn.h>
 
