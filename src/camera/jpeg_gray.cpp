@@ -45,13 +45,11 @@ void on_message(j_common_ptr jpeg, int level) {
 /// all is well; complaint() tells what is not.
 class JpegReader {
  public:
-  explicit JpegReader(const std::vector<u8>& bytes) {
+  explicit JpegReader(const std::vector<u8>& bytes) : bytes_(bytes) {
     jpeg_.err = jpeg_std_error(&complaints_.manager);
     complaints_.manager.error_exit = on_error;
     complaints_.manager.emit_message = on_message;
     complaints_.text[0] = '\0';
-    jpeg_create_decompress(&jpeg_);
-    jpeg_mem_src(&jpeg_, bytes.data(), static_cast<unsigned long>(bytes.size()));
   }
   ~JpegReader() { jpeg_destroy_decompress(&jpeg_); }
   JpegReader(const JpegReader&) = delete;
@@ -59,6 +57,9 @@ class JpegReader {
 
   bool read_header() {
     if (setjmp(complaints_.jump)) return false;
+    // No earlier: to take up no bytes at all is an error, too.
+    jpeg_create_decompress(&jpeg_);
+    jpeg_mem_src(&jpeg_, bytes_.data(), static_cast<unsigned long>(bytes_.size()));
     jpeg_read_header(&jpeg_, TRUE);
     return complaints_.text[0] == '\0';
   }
@@ -80,6 +81,7 @@ class JpegReader {
   const char* complaint() const { return complaints_.text; }
 
  private:
+  const std::vector<u8>& bytes_;
   jpeg_decompress_struct jpeg_ = {};
   Complaints complaints_ = {};
 };
