@@ -18,6 +18,25 @@ if(BERTH_SANITIZE)
   target_link_options(berth_options INTERFACE -fsanitize=${BERTH_SANITIZE})
 endif()
 
+# What an attacker would need is not writable, nor is the stack run: costs nothing once a program has started.
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  target_link_options(berth_options INTERFACE -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
+endif()
+# The same as distributions compile with, and the standard library's own checks (SECURITY.md has what they cost).
+if(BERTH_HARDENED)
+  if(BERTH_SANITIZE)
+    message(FATAL_ERROR "BERTH_HARDENED and BERTH_SANITIZE=${BERTH_SANITIZE} check the same things; give one of the two")
+  endif()
+  target_compile_definitions(berth_options INTERFACE _GLIBCXX_ASSERTIONS)
+  target_compile_options(berth_options INTERFACE $<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE> $<$<NOT:$<CONFIG:Debug>>:-D_FORTIFY_SOURCE=2>
+                                                 -fstack-protector-strong -fstack-clash-protection)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+    target_compile_options(berth_options INTERFACE -fcf-protection)
+  elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+    target_compile_options(berth_options INTERFACE -mbranch-protection=standard)
+  endif()
+endif()
+
 # berth_library(NAME SOURCES...): a static library with Berth's options and include folders.
 function(berth_library name)
   add_library(${name} STATIC ${ARGN})

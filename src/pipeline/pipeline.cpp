@@ -123,7 +123,7 @@ struct Pipeline::Impl {
       slot.frame.tracked = &slot.tracked;
     }
     make_waiters();
-    count_memory();
+    note_sizes();
     if (watch.is_on()) begin_watch();
     ring.close();  // until start: a frame that nobody takes would stand in no count
     watch.recover_by([this, width, height](std::unique_ptr<Backend> opened) {
@@ -147,9 +147,10 @@ struct Pipeline::Impl {
     return device.most_in_frame(config.tracking->most_windows, config.tracking->most_share * width * height);
   }
 
-  void count_memory() {
+  void note_sizes() {
+    geometry = slots.front().device().geometry();
     memory.slots = config.slots;
-    memory.frame_bytes = slots.front().device().geometry().frame_bytes();
+    memory.frame_bytes = geometry->frame_bytes();
     memory.host_bytes = sizeof(Impl);
     for (const Slot& slot : slots) {
       for (const std::unique_ptr<DeviceFrame>& device : slot.devices) {
@@ -474,6 +475,8 @@ struct Pipeline::Impl {
   SlotRing ring;
   /// By backend: the last that took over again, null before.
   std::vector<std::atomic<ReturnedFrames*>> returned;
+  /// Taken at the start: slots may get other frames later.
+  std::optional<MarkerGeometry> geometry;
   PipelineMemory memory;
   /// The host's thread's: of the known picture, and which backend was asked last.
   FrameResult known_result;
@@ -533,7 +536,7 @@ bool Pipeline::commit(const FrameStamp& stamp) {
 }
 
 bool Pipeline::push(View2D<const u8> image, const FrameStamp& stamp) {
-  const MarkerGeometry& g = impl_->slots.front().devices.front()->geometry();
+  const MarkerGeometry& g = *impl_->geometry;
   if (image.width != g.width || image.height != g.height) {
     throw Error("frame is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
                 "; this pipeline was made for " + std::to_string(g.width) + "x" + std::to_string(g.height));
