@@ -22,12 +22,11 @@ endif()
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
   target_link_options(berth_options INTERFACE -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
 endif()
-# The same as distributions compile with, and the standard library's own checks (SECURITY.md has what they cost).
+# The same as distributions compile with. Not _GLIBCXX_ASSERTIONS: SECURITY.md has what that costs.
 if(BERTH_HARDENED)
   if(BERTH_SANITIZE)
     message(FATAL_ERROR "BERTH_HARDENED and BERTH_SANITIZE=${BERTH_SANITIZE} check the same things; give one of the two")
   endif()
-  target_compile_definitions(berth_options INTERFACE _GLIBCXX_ASSERTIONS)
   target_compile_options(berth_options INTERFACE $<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE> $<$<NOT:$<CONFIG:Debug>>:-D_FORTIFY_SOURCE=2>
                                                  -fstack-protector-strong -fstack-clash-protection)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
