@@ -35,22 +35,24 @@ EXPORTED void failing_opencl_hold(int held) {
   changed.notify_all();
 }
 
-EXPORTED cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions,
-                                       const std::size_t* offset, const std::size_t* global, const std::size_t* local,
-                                       cl_uint waits, const cl_event* wait_list, cl_event* event) {
+EXPORTED cl_int clEnqueueNDRangeKernel(cl_command_queue command_queue, cl_kernel kernel, cl_uint work_dim,
+                                       const std::size_t* global_work_offset, const std::size_t* global_work_size,
+                                       const std::size_t* local_work_size, cl_uint num_events_in_wait_list,
+                                       const cl_event* event_wait_list, cl_event* event) {
   static auto* const enqueue = real<decltype(clEnqueueNDRangeKernel)>("clEnqueueNDRangeKernel");
   {
     const std::lock_guard<std::mutex> lock(mutex);
     if (is_lost) return CL_DEVICE_NOT_AVAILABLE;
   }
-  return enqueue(queue, kernel, dimensions, offset, global, local, waits, wait_list, event);
+  return enqueue(command_queue, kernel, work_dim, global_work_offset, global_work_size, local_work_size,
+                 num_events_in_wait_list, event_wait_list, event);
 }
 
-EXPORTED cl_int clWaitForEvents(cl_uint count, const cl_event* events) {
+EXPORTED cl_int clWaitForEvents(cl_uint num_events, const cl_event* event_list) {
   static auto* const wait = real<decltype(clWaitForEvents)>("clWaitForEvents");
   {
     std::unique_lock<std::mutex> lock(mutex);
     changed.wait(lock, [] { return !is_held; });
   }
-  return wait(count, events);
+  return wait(num_events, event_list);
 }
