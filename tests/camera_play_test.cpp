@@ -47,7 +47,7 @@ FakeV4l2 camera_of(std::size_t frames) {
 }
 
 std::unique_ptr<CameraSource> opened(FakeV4l2& camera) {
-  V4l2Options options = parse_v4l2("/dev/video7,format=GREY,buffers=2");
+  V4l2Options options = parse_v4l2("/dev/video7,format=GREY,buffers=2,repeats=on");
   options.watchdog_ms = 20;
   return open_v4l2(options, test::opener_of(camera));
 }

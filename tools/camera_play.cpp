@@ -128,10 +128,8 @@ void CameraPlay::sum_up(std::ostream& out) const {
 Json CameraPlay::summary() const {
   Json json = to_json(pipeline_, options_.deadlines_ms);
   const SourceHealth health = camera_.health();
-  json["camera"] = {{"skipped", health.skipped},
-                    {"lost", health.lost},
-                    {"incomplete", health.incomplete},
-                    {"reopened", health.reopened}};
+  json["camera"] = {{"skipped", health.skipped},   {"lost", health.lost},         {"incomplete", health.incomplete},
+                    {"repeated", health.repeated}, {"misdated", health.misdated}, {"reopened", health.reopened}};
   return {{"summary", json}};
 }
 

@@ -124,10 +124,11 @@ void StreamSummary::print_searches(std::ostream& people) const {
 void StreamSummary::print_rest(std::ostream& people, const SourceHealth& health) const {
   print_searches(people);
   // Nothing of files, nor of a camera that went through nothing.
-  if (health.lost + health.incomplete + health.skipped + health.reopened > 0) {
+  if (health.lost + health.incomplete + health.skipped + health.repeated + health.misdated + health.reopened > 0) {
     people << fmt::format(
-        "  camera: {} frames skipped for newer ones, {} lost before they came, {} incomplete; opened again {} times\n",
-        health.skipped, health.lost, health.incomplete, health.reopened);
+        "  camera: {} frames skipped for newer ones, {} lost before they came, {} incomplete, {} repeated, {} with "
+        "impossible times; opened again {} times\n",
+        health.skipped, health.lost, health.incomplete, health.repeated, health.misdated, health.reopened);
   }
   if (!has_truth_) return;
   score_.print(people);

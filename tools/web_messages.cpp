@@ -64,10 +64,9 @@ Json to_json(const WebStatus& status, double now_s, bool ended) {
   json["health"]["mode"] = name_of(mode);
   json["health"]["text"] = text_of(mode);
   json["valid"] = mode < HealthMode::stale;
-  json["camera"] = {{"lost", status.health.lost},
-                    {"incomplete", status.health.incomplete},
-                    {"skipped", status.health.skipped},
-                    {"reopened", status.health.reopened}};
+  json["camera"] = {{"lost", status.health.lost},         {"incomplete", status.health.incomplete},
+                    {"repeated", status.health.repeated}, {"misdated", status.health.misdated},
+                    {"skipped", status.health.skipped},   {"reopened", status.health.reopened}};
   if (!status.is_paced) return json;
   Json& pipeline = json["pipeline"];
   pipeline = {{"offered", status.counts.offered},

@@ -165,6 +165,8 @@ class WebReport final : public FrameObserver {
                  {"camera",
                   {{"lost", health_.lost},
                    {"incomplete", health_.incomplete},
+                   {"repeated", health_.repeated},
+                   {"misdated", health_.misdated},
                    {"skipped", health_.skipped},
                    {"reopened", health_.reopened}}}};
     for (const Kept& kept : kept_) json["samples"].push_back(to_json(kept.sample));

@@ -51,6 +51,10 @@ struct SourceHealth {
   u64 incomplete = 0;
   /// Frames that were older than another one already there when they were to be handed on.
   u64 skipped = 0;
+  /// Frames whose time is the last one's, or whose picture is to the last bit; they are not handed on.
+  u64 repeated = 0;
+  /// Frames whose time runs backwards or is ahead of what it can be; they are not handed on.
+  u64 misdated = 0;
   /// Times the camera was opened again.
   u64 reopened = 0;
 };

@@ -42,6 +42,8 @@ struct AravisOptions {
     ptp,
   } time = Time::host;
   int watchdog_ms = 1000;
+  /// LiveOptions::repeats
+  bool repeats = false;
 };
 
 /// Options of a source's name without "aravis:": "CAMERA[,KEY=VALUE...]". Throws Error that names the key, its value

@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kKeys =
     "width, height, x, y, fps, format, exposure_us, gain, trigger, packet_size, buffers, retention_ms, resend, time, "
-    "watchdog_ms";
+    "watchdog_ms, repeats";
 
 bool set_image(AravisOptions& options, const SourceKeys& keys, const std::string& key, const std::string& value) {
   if (key == "width") {
@@ -55,8 +55,7 @@ bool set_transport(AravisOptions& options, const SourceKeys& keys, const std::st
   } else if (key == "retention_ms") {
     options.retention_ms = keys.real(key, value, 0.1, 1000);
   } else if (key == "resend") {
-    if (value != "on" && value != "off") keys.refuse(key, value, "give on or off");
-    options.resend = value == "on";
+    options.resend = keys.on_or_off(key, value);
   } else if (key == "time") {
     if (value != "host" && value != "camera" && value != "ptp") keys.refuse(key, value, "give host, camera or ptp");
     options.time = value == "host"     ? AravisOptions::Time::host
@@ -64,6 +63,8 @@ bool set_transport(AravisOptions& options, const SourceKeys& keys, const std::st
                                        : AravisOptions::Time::ptp;
   } else if (key == "watchdog_ms") {
     options.watchdog_ms = keys.whole(key, value, 1, 60'000);
+  } else if (key == "repeats") {
+    options.repeats = keys.on_or_off(key, value);
   } else {
     return false;
   }
@@ -105,6 +106,7 @@ std::unique_ptr<CameraSource> open_aravis(const AravisOptions& options) {
   live.name = "aravis:" + options.name;
   live.buffers = options.buffers;
   live.watchdog_ms = options.watchdog_ms;
+  live.repeats = options.repeats;
   live.closes_aside = true;
   return open_live(live, aravis_opener(options));
 }

@@ -16,6 +16,8 @@ struct GstOptions {
   /// Frames that are held meanwhile; the oldest makes room.
   int buffers = 4;
   int watchdog_ms = 1000;
+  /// LiveOptions::repeats: decoders give the same picture again where nothing moves.
+  bool repeats = true;
 };
 
 /// Options of a source's name without "gst:": "[KEY=VALUE[,KEY=VALUE...];]PIPELINE". Throws Error that names the key,

@@ -17,6 +17,8 @@ bool set(GstOptions& options, const SourceKeys& keys, const std::string& key, co
     options.buffers = keys.whole(key, value, 2, 64);
   } else if (key == "watchdog_ms") {
     options.watchdog_ms = keys.whole(key, value, 1, 60'000);
+  } else if (key == "repeats") {
+    options.repeats = keys.on_or_off(key, value);
   } else {
     return false;
   }
@@ -33,7 +35,7 @@ bool begins_with_a_key(const std::string& text) {
 }  // namespace
 
 GstOptions parse_gst(const std::string& text) {
-  const SourceKeys keys("gst", "exposure_us, buffers, watchdog_ms");
+  const SourceKeys keys("gst", "exposure_us, buffers, watchdog_ms, repeats");
   GstOptions options;
   std::string rest = text;
   if (begins_with_a_key(text)) {
@@ -70,6 +72,7 @@ std::unique_ptr<CameraSource> open_gst(const GstOptions& options) {
   live.name = name_of(options);
   live.buffers = options.buffers;
   live.watchdog_ms = options.watchdog_ms;
+  live.repeats = options.repeats;
   live.closes_aside = true;
   return open_live(live, gst_opener(options));
 }

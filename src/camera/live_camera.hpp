@@ -54,6 +54,9 @@ struct LiveOptions {
   int buffers = 4;
   /// Without a whole frame for this long, ms, the camera is closed and opened again.
   int watchdog_ms = 1000;
+  /// The same picture over and over, to the last bit, is handed on all the same: where a decoder or a test picture
+  /// rightly repeats one. Otherwise it is taken for a camera that hangs.
+  bool repeats = false;
   /// Closing a camera that is gone takes seconds: it is done beside opening it again, not before.
   bool closes_aside = false;
 };

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <future>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "berth/error.hpp"
+#include "camera/frame_check.hpp"
 #include "monotonic.hpp"
 
 namespace berth {
@@ -16,6 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
+constexpr const char* kNothing = "whole frame";
 constexpr milliseconds kFirstPause{50}, kLongestPause{500}, kLongestSilence{3000};
 
 class LiveSource final : public CameraSource {
@@ -48,12 +51,13 @@ class LiveSource final : public CameraSource {
     for (;;) {
       const int error = take_newest(awaited_, deadline);
       if (error != 0 && error != ETIMEDOUT) lose(camera_->explain(error));
-      if (error == 0 && !awaited_.damaged) return stamp(awaited_);
       if (error == 0) {
-        ++health_.incomplete;
+        if (!awaited_.damaged && is_in_time(awaited_)) return stamp(awaited_);
+        if (awaited_.damaged) count(health_.incomplete, "whole frame");
         if (const int refused = camera_->give_back(awaited_)) lose(camera_->explain(refused));
       }
-      // A camera whose frames are all damaged is of no more use than one that gives none.
+      // A camera whose frames are all damaged, or none of whose times can be, is of no more use than one that gives
+      // none.
       if (Clock::now() >= deadline) lose_for_silence();
     }
   }
@@ -64,16 +68,19 @@ class LiveSource final : public CameraSource {
            std::to_string(image.width) + "x" + std::to_string(image.height) + "; say which by width and height");
     }
     const bool is_whole = camera_->read(awaited_, image);
-    if (!is_whole) ++health_.incomplete;
+    if (!is_whole) count(health_.incomplete, "whole frame");
     if (const int refused = camera_->give_back(awaited_)) lose(camera_->explain(refused));
-    if (is_whole) {
+    const bool is_repeat = is_whole && !options_.repeats && repeat_check_.is_repeat(image);
+    if (is_repeat) count(health_.repeated, "new picture");
+    if (is_whole && !is_repeat) {
       pause_ = kFirstPause;
-      incomplete_since_.reset();
+      useless_since_.reset();
+      lacks_ = kNothing;
       return true;
     }
     const Clock::time_point now = Clock::now();
-    if (!incomplete_since_) incomplete_since_ = now;
-    if (now - *incomplete_since_ >= milliseconds(options_.watchdog_ms)) lose_for_silence();
+    if (!useless_since_) useless_since_ = now;
+    if (now - *useless_since_ >= milliseconds(options_.watchdog_ms)) lose_for_silence();
     return false;
   }
 
@@ -102,6 +109,7 @@ class LiveSource final : public CameraSource {
       }
     }
     has_sequence_ = false;
+    time_check_.begin_anew();
     ++health_.reopened;
     width_ = camera_->width();
     height_ = camera_->height();
@@ -115,13 +123,40 @@ class LiveSource final : public CameraSource {
     pause_ = std::min(2 * pause_, kLongestPause);
   }
 
-  [[noreturn]] void lose_for_silence() { lose("no whole frame for " + std::to_string(options_.watchdog_ms) + " ms"); }
+  [[noreturn]] void lose_for_silence() {
+    lose(std::string("no ") + lacks_ + " for " + std::to_string(options_.watchdog_ms) + " ms");
+  }
+
+  /// A frame of no use, and what it is not.
+  void count(u64& counted, const char* lacks) {
+    ++counted;
+    lacks_ = lacks;
+  }
+
+  bool is_in_time(const LiveCamera::Filled& filled) {
+    const bool same_clock = std::string_view(filled.clock) == "monotonic";
+    switch (time_check_.look(filled.time_ns, monotonic_ns(), same_clock)) {
+      case TimeVerdict::fine:
+        return true;
+      case TimeVerdict::again:
+        count(health_.repeated, "new frame");
+        return false;
+      case TimeVerdict::back:
+        count(health_.misdated, "frame whose time goes on");
+        return false;
+      case TimeVerdict::ahead:
+        break;
+    }
+    count(health_.misdated, "frame whose time is not ahead of the clock");
+    return false;
+  }
 
   [[noreturn]] void lose(const std::string& why) {
     // One that is still being closed has had the whole life of this one for it.
     closing_ = std::async(std::launch::async, [camera = std::move(camera_)]() mutable { camera.reset(); });
     if (!options_.closes_aside) closing_.get();
-    incomplete_since_.reset();
+    useless_since_.reset();
+    lacks_ = kNothing;
     has_complained_ = false;
     throw Error(options_.name + ": the camera is lost (" + why + "); it is opened again as soon as it is back");
   }
@@ -169,7 +204,10 @@ class LiveSource final : public CameraSource {
   std::unique_ptr<LiveCamera> camera_;
   int width_ = 0, height_ = 0;
   LiveCamera::Filled awaited_;
-  std::optional<Clock::time_point> incomplete_since_;
+  std::optional<Clock::time_point> useless_since_;
+  const char* lacks_ = kNothing;  // what the camera has not given since the last good frame
+  TimeCheck time_check_;
+  RepeatCheck repeat_check_;  // of all times that it was opened: one that hangs hangs on
   SourceHealth health_;
   milliseconds pause_ = kFirstPause;
   bool has_complained_ = false;

@@ -9,10 +9,11 @@
 namespace berth {
 
 /// A camera as a source, newest frame first: what it took while a frame was being looked at is skipped and counted.
-/// A camera that gives no whole frame for LiveOptions::watchdog_ms, or is gone, is complained of (Error) and opened
-/// again by its name on a thread of its own, at most every 0.5 s; frames go on when it is back. The first attempt that
-/// fails is complained of, and then what fails every 3 s, which is how long next() waits.
-/// Throws Error when it cannot be opened the first time.
+/// Frames whose time cannot be, and pictures that it hands over again (LiveOptions::repeats), are counted and not
+/// handed on (frame_check.hpp). A camera that gives no frame that is whole, new and in time for
+/// LiveOptions::watchdog_ms, or is gone, is complained of (Error) and opened again by its name on a thread of its own,
+/// at most every 0.5 s; frames go on when it is back. The first attempt that fails is complained of, and then what
+/// fails every 3 s, which is how long next() waits. Throws Error when it cannot be opened the first time.
 std::unique_ptr<CameraSource> open_live(const LiveOptions& options, LiveCameraOpener opener);
 
 }  // namespace berth

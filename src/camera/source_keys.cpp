@@ -77,6 +77,11 @@ std::string SourceKeys::one_of(const std::string& key, const std::string& value,
   refuse(key, value, "give one of " + all);
 }
 
+bool SourceKeys::on_or_off(const std::string& key, const std::string& value) const {
+  if (value != "on" && value != "off") refuse(key, value, "give on or off");
+  return value == "on";
+}
+
 void SourceKeys::refuse(const std::string& key, const std::string& value, const std::string& remedy) const {
   throw bad_field(kSource, kind_ + ":…," + key, "'" + value + "'", remedy);
 }

@@ -21,6 +21,7 @@ class SourceKeys {
   /// Above 0.
   double frames_per_second(const std::string& key, const std::string& value) const;
   double real(const std::string& key, const std::string& value, double least, double most) const;
+  bool on_or_off(const std::string& key, const std::string& value) const;
   /// The value itself.
   std::string one_of(const std::string& key, const std::string& value, const std::vector<std::string>& known) const;
   [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& remedy) const;

@@ -26,6 +26,8 @@ struct V4l2Options {
   int buffers = 4;
   /// Without a whole frame for this long, 1 to 60,000, the camera is closed and opened again.
   int watchdog_ms = 1000;
+  /// LiveOptions::repeats
+  bool repeats = false;
 };
 
 /// Options of a source's name without "v4l2:": "PATH[,KEY=VALUE...]", PATH as above, or by-path/NAME, by-id/NAME,

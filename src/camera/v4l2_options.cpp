@@ -32,6 +32,8 @@ bool set(V4l2Options& options, const SourceKeys& keys, const std::string& key, c
     options.buffers = keys.whole(key, value, 2, 32);
   } else if (key == "watchdog_ms") {
     options.watchdog_ms = keys.whole(key, value, 1, 60'000);
+  } else if (key == "repeats") {
+    options.repeats = keys.on_or_off(key, value);
   } else {
     return false;
   }
@@ -41,7 +43,7 @@ bool set(V4l2Options& options, const SourceKeys& keys, const std::string& key, c
 }  // namespace
 
 V4l2Options parse_v4l2(const std::string& text) {
-  const SourceKeys keys("v4l2", "width, height, fps, format, exposure_us, gain, buffers, watchdog_ms");
+  const SourceKeys keys("v4l2", "width, height, fps, format, exposure_us, gain, buffers, watchdog_ms, repeats");
   V4l2Options options;
   options.path = device_path(keys.read(
       text, [&](const std::string& key, const std::string& value) { return set(options, keys, key, value); }));

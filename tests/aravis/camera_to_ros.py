@@ -259,7 +259,7 @@ def check_frames(cameras, lines, summary, expected, given_up):
     check(len(lines) == summary["delivered"], "the log lacks frames")
     dropped, camera = sum(summary["dropped"].values()), summary["camera"]
     check(summary["offered"] == len(lines) + dropped, "the pipeline's counts do not add up")
-    counted = dropped + camera["skipped"] + camera["lost"] + camera["incomplete"]
+    counted = dropped + camera["skipped"] + camera["lost"] + camera["incomplete"] + camera["repeated"] + camera["misdated"]
     missing = sum(map(len, taken)) - len(lines)
     # What nobody can count: frames of which nothing came, before the first that did or after the last, also where the
     # camera was given up without need, on a machine that let a process wait for so long.

@@ -40,7 +40,7 @@
     Object.entries(data.searches || {}).forEach(([name, n]) => list.push(['searched: ' + name, berth.count(n) + ' frames']));
     if (data.pipeline) list.push(['late', data.pipeline.late.map(berth.count).join(', ') + ' frames past each deadline']);
     const camera = data.camera;
-    if (camera.lost + camera.incomplete + camera.reopened) list.push(['camera', camera.lost + ' lost, ' + camera.incomplete + ' incomplete, opened again ' + camera.reopened + ' ×']);
+    if (camera.lost + camera.incomplete + camera.repeated + camera.misdated + camera.reopened) list.push(['camera', camera.lost + ' lost, ' + camera.incomplete + ' incomplete, ' + camera.repeated + ' repeated, ' + camera.misdated + ' with impossible times, opened again ' + camera.reopened + ' ×']);
     list.forEach(([name, value]) => {
       const term = document.createElement('dt'), text = document.createElement('dd');
       term.textContent = name;

@@ -302,14 +302,14 @@
 
   function showHealth(s) {
     const lines = [];
-    const camera = s.camera, total = camera.lost + camera.incomplete;
+    const camera = s.camera, total = camera.lost + camera.incomplete + camera.repeated + camera.misdated;
     if (s.health.mode !== 'nominal') lines.push([s.valid ? 'warn' : 'bad', s.health.text + (s.health.reason ? ': ' + s.health.reason : '')]);
     if (s.health.known_answers) lines.push(['', berth.count(s.health.known_answers) + ' known answers, ' + s.health.wrong_answers + ' wrong']);
     if (s.health.recovery === 'trying') lines.push(['warn', 'the backend that was left is tried again, so far ' + s.health.tries + ' ×']);
     if (s.health.recovery === 'given up') lines.push(['warn', 'a backend was left too often and is not tried any more']);
     if (s.health.returns) lines.push(['', 'went back to a backend ' + s.health.returns + ' ×']);
     lines.push(s.status === 'device_lost' ? ['bad', 'the device is lost'] : ['', 'device: ' + s.backend]);
-    lines.push(total ? ['warn', 'camera: ' + camera.lost + ' lost, ' + camera.incomplete + ' incomplete'] : ['', 'camera: no frame lost']);
+    lines.push(total ? ['warn', 'camera: ' + camera.lost + ' lost, ' + camera.incomplete + ' incomplete, ' + camera.repeated + ' repeated, ' + camera.misdated + ' with impossible times'] : ['', 'camera: no frame lost']);
     if (camera.reopened) lines.push(['warn', 'camera opened again ' + camera.reopened + ' ×']);
     if (camera.skipped) lines.push(['', berth.count(camera.skipped) + ' frames skipped for newer ones']);
     if (s.overflows) lines.push(['warn', 'lists ran full in ' + berth.count(s.overflows) + ' frames']);
