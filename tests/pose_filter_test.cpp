@@ -163,9 +163,34 @@ TEST(PoseFilter, SaysWhatItDidNotSee) {
   EXPECT_FALSE(filter.update(now + 600'000'000, nullptr).has_pose);
   const Detection again = seen(truth, random);
   EXPECT_TRUE(filter.update(now + 700'000'000, &again).measured);
-  const FilteredPose& backwards = filter.update(now, &again);
+  const FilteredPose& backwards = filter.update(now + 650'000'000, &again);
   EXPECT_TRUE(backwards.outlier);
   EXPECT_FALSE(backwards.measured);
+  EXPECT_FALSE(backwards.has_pose) << "nothing is said of a time that has passed";
+  EXPECT_TRUE(filter.foretell(now + 710'000'000).has_pose) << "the track is still there";
+}
+
+TEST(PoseFilter, AClockThatWasSetBackBeginsTheTrackAnew) {
+  sim::Random random(1);
+  const Pose truth = {sim::rotation(0.4, 0, 0), {0, 0, 0.6}};
+  const Detection marker = seen(truth, random);
+  PoseFilter filter(config());
+  std::int64_t now = 100'000'000'000;
+  for (int i = 0; i < 20; ++i) filter.update(now += kFrame_ns, &marker);
+  // By an hour: at once.
+  now -= 3'600'000'000'000;
+  const FilteredPose& later = filter.update(now, &marker);
+  EXPECT_TRUE(later.measured);
+  EXPECT_TRUE(later.jumped);
+  EXPECT_EQ(later.time_ns, now);
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(filter.update(now += kFrame_ns, &marker).measured);
+  // By 0.4 s: when it stays so.
+  now -= 400'000'000;
+  int kept_out = 0;
+  while (filter.update(now += 1'000'000, &marker).outlier) ++kept_out;
+  EXPECT_EQ(kept_out, config().most_outliers);
+  EXPECT_EQ(filter.foretell(now).time_ns, now);
+  EXPECT_TRUE(filter.foretell(now).has_pose);
 }
 
 TEST(PoseFilter, KeepsOutliersOutAndBeginsAnewWhenTheyStay) {

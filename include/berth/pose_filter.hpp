@@ -37,7 +37,7 @@ struct PoseFilterConfig {
 /// The pose at a frame's time, from this frame and those before it.
 struct FilteredPose {
   std::int64_t time_ns = 0;
-  /// There is a track. False: nothing was seen, for `lost_s` or ever.
+  /// There is a track. False: nothing was seen, for `lost_s` or ever, or the frame's time is before the last one's.
   bool has_pose = false;
   /// This frame's marker went into it. False: it is foretold from earlier frames.
   bool measured = false;
@@ -69,7 +69,8 @@ class PoseFilter {
   PoseFilter& operator=(PoseFilter&&) noexcept;
 
   /// A frame of that time (mid-exposure, ns); `marker` with a pose, or null where it was not read. Frames come in their
-  /// order in time; one that does not is kept out. Valid until the next call.
+  /// order in time; one that does not is kept out and has no pose. The track begins anew where time goes back by more
+  /// than `lost_s`, or for more than `most_outliers` frames in a row. Valid until the next call.
   const FilteredPose& update(std::int64_t mid_exposure_ns, const Detection* marker);
   /// What the last frame says of another time, later for what has to reach an actuator: measured is false there.
   FilteredPose foretell(std::int64_t time_ns) const;

@@ -231,6 +231,7 @@ struct PoseFilter::Impl {
   std::array<Way, kMostWays> found;  // by the present frame
   std::size_t found_count = 0;
   int outliers = 0;
+  int backwards = 0;       // frames in a row whose time is before the track's
   bool had_track = false;  // before the present frame
   FilteredPose result;
 };
@@ -247,10 +248,17 @@ const FilteredPose& PoseFilter::update(std::int64_t mid_exposure_ns, const Detec
   const bool seen = marker != nullptr && marker->has_pose;
   result.measured = result.jumped = result.outlier = false;
   if (it.had_track && mid_exposure_ns < result.time_ns) {
-    result.outlier = seen;
-    return result;
+    // Nothing is said of a time that has passed. A clock that was set must not keep out all that follows.
+    const double back_s = static_cast<double>(result.time_ns - mid_exposure_ns) * 1e-9;
+    if (back_s <= it.config.lost_s && ++it.backwards <= it.config.most_outliers) {
+      result.outlier = seen;
+      result.has_pose = false;
+      return result;
+    }
+    it.way_count = 0;
   }
-  if (it.had_track) {
+  it.backwards = 0;
+  if (it.way_count > 0) {
     const double seconds = static_cast<double>(mid_exposure_ns - result.time_ns) * 1e-9;
     result.age_s += seconds;
     if (result.age_s > it.config.lost_s) it.way_count = 0;
@@ -269,10 +277,8 @@ FilteredPose PoseFilter::foretell(std::int64_t time_ns) const {
   const double seconds = static_cast<double>(time_ns - result.time_ns) * 1e-9;
   result.time_ns = time_ns;
   result.age_s += seconds;
-  if (!result.has_pose || seconds < 0 || result.age_s > it.config.lost_s) {
-    result.has_pose = false;
-    return result;
-  }
+  result.has_pose = it.way_count > 0 && seconds >= 0 && result.age_s <= it.config.lost_s;
+  if (!result.has_pose) return result;
   Motion motion = it.ways[0].motion;
   advance(seconds, it.variance, motion);
   result.pose = motion.pose;
@@ -283,6 +289,7 @@ FilteredPose PoseFilter::foretell(std::int64_t time_ns) const {
 
 void PoseFilter::reset() {
   impl_->way_count = 0;
+  impl_->backwards = 0;
   impl_->result = {};
 }
 
