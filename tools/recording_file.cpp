@@ -20,7 +20,7 @@ namespace {
 /// so often: what a loss of power costs.
 constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
 constexpr std::chrono::seconds kChunkAge{1}, kSyncEvery{1};
-constexpr std::int64_t kHealthEveryNs = 1'000'000'000;
+constexpr std::chrono::seconds kHealthEvery{1};
 
 constexpr const char* kCameraFrame = "camera";
 
@@ -131,12 +131,14 @@ void RecordingFile::write_poses(const FrameResult& result, std::int64_t stamp_ns
 
 void RecordingFile::write_health(const QueuedFrame& frame, std::uint64_t dropped_pictures,
                                  std::uint64_t dropped_frames) {
-  if (frame.came_ns < next_health_ns_) return;
-  next_health_ns_ = frame.came_ns + kHealthEveryNs;
+  // Not by when the frame came: that is the wall clock's, which may be set back by an hour.
+  const Clock::time_point now = Clock::now();
+  if (now < next_health_) return;
+  next_health_ = now + kHealthEvery;
   const auto number = [](const char* key, std::uint64_t value) { return ros2::KeyValue{key, std::to_string(value)}; };
   const bool dropping = dropped_pictures + dropped_frames > 0;
   const SourceHealth& health = frame.health;
-  const bool lossy = health.lost + health.incomplete + health.reopened > 0;
+  const bool lossy = health.lost + health.incomplete + health.repeated + health.misdated + health.reopened > 0;
   ros2::DiagnosticArray array{{frame.came_ns, ""}, {}};
   array.status.push_back({dropping ? ros2::Level::warn : ros2::Level::ok,
                           "berth: recorder",
@@ -149,7 +151,8 @@ void RecordingFile::write_health(const QueuedFrame& frame, std::uint64_t dropped
                           lossy ? "frames are missing" : "nothing is missing",
                           "",
                           {number("lost", health.lost), number("incomplete", health.incomplete),
-                           number("skipped", health.skipped), number("reopened", health.reopened)}});
+                           number("skipped", health.skipped), number("repeated", health.repeated),
+                           number("misdated", health.misdated), number("reopened", health.reopened)}});
   const HealthMode mode = mode_of(frame.engine, frame.result.status);
   array.status.push_back({mode == HealthMode::failed    ? ros2::Level::error
                           : mode == HealthMode::nominal ? ros2::Level::ok

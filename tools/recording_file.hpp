@@ -78,7 +78,7 @@ class RecordingFile {
   std::int64_t start_wall_ns_ = 0, start_monotonic_ns_ = 0;
   bool has_first_ = false;
   std::int64_t first_ns_ = 0;  // the first frame's time, on a clock that is not the monotonic one
-  std::int64_t next_health_ns_ = 0;
+  Clock::time_point next_health_;
   Clock::time_point chunk_began_, synced_;
   std::uint64_t frames_ = 0, whole_frames_ = 0;
 };
