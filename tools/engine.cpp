@@ -300,7 +300,14 @@ std::vector<Backend*> Engine::backends() const {
 }
 
 HealthReport Engine::health() const {
-  return detectors_.empty() || !detectors_.front().alone ? HealthReport() : detectors_.front().alone->health();
+  if (detectors_.empty() || !detectors_.front().alone) return {};
+  HealthReport report = detectors_.front().alone->health();
+  // A detector of another size may know of no failure.
+  if (report.mode == HealthMode::nominal && detectors_.front().first > 0) {
+    report.mode = HealthMode::fallback;
+    report.reason = left_;
+  }
+  return report;
 }
 
 Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& stamp) {
@@ -314,7 +321,7 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
   }
   if (detectors_.size() == kDetectorsKept) detectors_.pop_back();
   DetectorConfig config = config_for(image.width, image.height);
-  Sized sized{image.width, image.height, nullptr, nullptr, nullptr};
+  Sized sized{image.width, image.height, backends_.lockstep ? 0 : active_, nullptr, nullptr, nullptr};
   if (tracking_) {
     config.window_sides = tracking_window_sides(image.width, image.height, *tracking_);
     sized.tracker = std::make_unique<Tracker>(image.width, image.height, *tracking_);
@@ -323,7 +330,14 @@ Engine::Sized& Engine::detector_for(View2D<const u8> image, const FrameStamp& st
   if (backends_.lockstep) {
     sized.pair = std::make_unique<Lockstep>(*chain[0], *chain[1], image.width, image.height, config);
   } else {
-    sized.alone = std::make_unique<FailoverDetector>(chain, image.width, image.height, config, health_);
+    const std::vector<Backend*> left(chain.begin() + static_cast<std::ptrdiff_t>(sized.first), chain.end());
+    std::optional<HealthConfig> health = health_;
+    if (health && health->recovery) {
+      health->recovery->open = [open = health->recovery->open, first = sized.first](std::size_t i) {
+        return open(first + i);
+      };
+    }
+    sized.alone = std::make_unique<FailoverDetector>(left, image.width, image.height, config, health);
   }
   sized.detect(image, stamp);
   detectors_.insert(detectors_.begin(), std::move(sized));
@@ -338,7 +352,11 @@ TimedResult Engine::detect(View2D<const u8> image, const FrameStamp& stamp) {
   const FrameResult& frame = tracked != nullptr ? *tracked->result : detector.detect(image, stamp);
   const std::int64_t cpu_ns = process_cpu_ns() - cpu_start;
   const auto wall = std::chrono::steady_clock::now() - wall_start;
-  if (detector.alone) active_ = detector.alone->active();
+  if (detector.alone) {
+    const std::size_t active = detector.first + detector.alone->active();
+    if (active > active_) left_ = detector.alone->health().reason;
+    active_ = active;
+  }
   return {frame, cpu_ns, std::chrono::duration_cast<std::chrono::nanoseconds>(wall).count(),
           detector.pair ? detector.pair->difference() : std::nullopt, tracked};
 }

@@ -128,6 +128,8 @@ class Engine {
   struct Sized {
     int width;
     int height;
+    /// The first of the backends that it was made for: those left before are lost.
+    std::size_t first;
     /// One of the two.
     std::unique_ptr<FailoverDetector> alone;
     std::unique_ptr<Lockstep> pair;
@@ -143,6 +145,8 @@ class Engine {
 
   EngineBackends backends_;
   std::size_t active_ = 0;
+  /// Why a backend was left; null where none was.
+  const char* left_ = nullptr;
   DetectorConfig config_;
   CameraFit fit_;
   std::optional<TrackerConfig> tracking_;

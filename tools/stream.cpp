@@ -195,7 +195,7 @@ class StreamRun {
     if (!config.camera && has_sizes) console_.note("no poses: --camera is missing");
     if (config.camera && !has_sizes && !(config.marker_size_m > 0)) console_.note("no poses: --size is missing");
     config.digests = options_.digests;
-    EngineBackends opened = open_chosen_backends(engine_options);
+    EngineBackends opened = options_.open_backends(engine_options);
     reopen_ = opened.reopen;
     engine_.emplace(std::move(opened), std::move(config), engine_options.camera_fit, tracking(), health());
     const std::string backend = engine_->describe();
@@ -429,8 +429,12 @@ class StreamRun {
     summary_.print_rest(people_, source_.health());
     if (!options_.log.empty() && options_.log != "-") {
       log_.close();
-      if (!log_) throw Error(options_.log + ": writing the log failed; check the disk's space");
-      people_ << "log         " << options_.log << '\n';
+      // Complained of and not thrown: recordings and views are yet to be ended.
+      if (log_) {
+        people_ << "log         " << options_.log << '\n';
+      } else {
+        console_.complain(options_.log + ": writing the log failed; check the disk's space");
+      }
     }
     if (engine_) summary_.write_files(console_, people_, *engine_);
     for (const auto& observer : options_.observers) observer->finish(people_);

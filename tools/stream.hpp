@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,6 +17,8 @@ namespace berth::cli {
 /// What becomes of a source's frames.
 struct StreamOptions {
   EngineOptions engine;
+  /// What opens its backends.
+  std::function<EngineBackends(const EngineOptions&)> open_backends = open_chosen_backends;
   /// JSON lines, one a frame; "-" is standard output, and what a person reads then goes to standard error.
   std::string log;
   /// Trajectory drawing of the marker seen most often.
