@@ -209,6 +209,31 @@ class Published(unittest.TestCase):
             self.assertEqual(picture.format_, "png")
             self.assertEqual(bytes(picture.data_[:8]), b"\x89PNG\r\n\x1a\n")
 
+    def test_a_reader_behind_a_cut_cable_holds_no_frame_up(self):
+        # A reliable reader that asks for all, and from its first message on neither takes nor acknowledges anything: to
+        # the writer, a partition of the network.
+        number = FIRST_DOMAIN + 3
+        code = (f"import os, sys; sys.path.insert(0, {str(pathlib.Path(__file__).parent)!r}); sys.argv = ['', '', '']\n"
+                "import publish_test as p, signal\n"
+                f"domain = p.DomainParticipant({number})\n"
+                "pose = p.reader(domain, 'pose', p.ros.PoseWithCovarianceStamped)\n"
+                "assert p.first_of(pose, 60)\n"
+                "print('cut', flush=True); os.kill(os.getpid(), signal.SIGSTOP)\n")
+        other = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+        self.addCleanup(other.stdout.close)
+        self.addCleanup(other.wait)
+        self.addCleanup(other.kill)
+        log = os.path.join(self.folder.name, "log.jsonl")
+        run = self.berth("--source", SCENARIO, "--max-frames=4", "--fps=300", "--minutes=0.03", "--json", log, "--ros",
+                         f"--ros-domain={number}", "--ros-wait=30", "--ros-topic=detected_dock_pose=off", "--ros-topic=tf=off",
+                         "--ros-topic=detections=off", "--ros-topic=diagnostics=off")
+        output = self.output_of(run)
+        self.assertEqual(other.stdout.readline(), "cut\n")
+        summary = json.loads(pathlib.Path(log).read_text().splitlines()[-1])["summary"]
+        self.assertEqual(summary["offered"], 540)
+        # A writer that waited for the reader would hold the stream's thread up, and frames would be dropped for it.
+        self.assertLess(summary["dropped"]["reader"], 270, output)
+
     def test_commands_in_the_documents_run(self):
         text = (ROOT / "docs/ros2.md").read_text()
         commands = [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()
