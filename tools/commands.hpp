@@ -17,6 +17,7 @@ void add_print_tag(CLI::App& app, Console& console, int& exit_code);
 void add_recover(CLI::App& app, Console& console, int& exit_code);
 void add_replay(CLI::App& app, Console& console, int& exit_code);
 void add_run(CLI::App& app, Console& console, int& exit_code);
+void add_soak(CLI::App& app, Console& console, int& exit_code);
 void add_survey(CLI::App& app, Console& console, int& exit_code);
 void add_table(CLI::App& app, Console& console, int& exit_code);
 void add_verify(CLI::App& app, Console& console, int& exit_code);

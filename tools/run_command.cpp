@@ -76,6 +76,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_model(app, console, exit_code);
   add_print_tag(app, console, exit_code);
   add_plan(app, console, exit_code);
+  add_soak(app, console, exit_code);
   add_survey(app, console, exit_code);
   add_table(app, console, exit_code);
   add_doctor(app, console, exit_code);

@@ -38,6 +38,7 @@ STAND_INS = [
     (r"--view 0\.0\.0\.0:8040", "--view 127.0.0.1:0"),
     (r"--view(?= -|$)", "--view 127.0.0.1:0"),
     (r"^berth chaos$", "berth chaos --flips 20"),
+    (r"^berth soak --hours 8", "berth soak --scenarios 1"),
     (r"seed in 1 2 3", "seed in 1"),
     (r"--flips 40000", "--flips 20"),
     (r"^berth flight --count 100", "berth flight --count 1 --frames 12"),
