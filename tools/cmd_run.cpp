@@ -77,7 +77,7 @@ bool is_same_file(const std::string& source, const std::string& file) {
 
 }  // namespace
 
-void add_run(CLI::App& app, Console& console, int& exit_code) {
+void add_run(CLI::App& app, Console& console, int& exit_code, const RunPart& part) {
   struct Options {
     std::string source, config;
     StreamOptions stream;
@@ -169,7 +169,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
   add_deviation_options(*command, options->stream.engine);
   add_stream_backend_options(*command, options->stream.engine);
   command->footer(kExamples);
-  command->callback([options, &console, &exit_code, pipeline, stream, known_answer] {
+  command->callback([options, &console, &exit_code, pipeline, stream, known_answer, part] {
     PaceOptions& given = options->stream.pace;
     const bool is_camera = names_camera(options->source);
     if (given.fps != 0 && is_camera) {
@@ -201,6 +201,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code) {
     if (!options->record.file.empty() && is_same_file(options->source, options->record.file)) {
       throw Error(options->record.file + ": it is the source itself; record in another file");
     }
+    if (part) part(options->stream);
     if (options->ros.on) options->stream.observers.push_back(make_ros_publisher(make_ros_plan(options->ros)));
     const std::unique_ptr<Source> source = open_source(options->source);
     options->web.source = options->source;

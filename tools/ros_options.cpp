@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <optional>
 #include <sstream>
 
 #include "berth/error.hpp"
-#include "exact_math.hpp"
-#include "pose_algebra.hpp"
+#include "mount.hpp"
 
 namespace berth::cli {
 namespace {
@@ -130,27 +130,14 @@ void set_policy(const std::string& text, const std::string& policy, RosTopicPlan
 
 void set_mount(const std::string& text, RosPlan& plan) {
   if (text.empty()) return;
-  const std::vector<std::string> parts = split(text, ',');
-  std::array<double, 6> numbers = {};
-  bool good = parts.size() == 7;
-  for (std::size_t i = 0; good && i < 6; ++i) {
-    char* end = nullptr;
-    numbers[i] = std::strtod(parts[i + 1].c_str(), &end);
-    good = !parts[i + 1].empty() && *end == '\0' && numbers[i] > -1e4 && numbers[i] < 1e4;
-  }
-  if (!good) {
+  const std::size_t comma = text.find(',');
+  const std::optional<Mount> mount = comma == std::string::npos ? std::nullopt : read_mount(text.substr(comma + 1));
+  if (!mount) {
     refuse("--ros-mount", text, "not a frame and six numbers",
            "give PARENT,X,Y,Z,ROLL,PITCH,YAW in metres and degrees, e.g. base_link,0.2,0,0.3,0,0,0");
   }
-  plan.parent = checked_frame("--ros-mount", parts[0]);
-  const auto turn = [&](std::size_t i) { return radians(numbers[i]); };
-  const double sr = exact_sin(turn(3)), cr = exact_cos(turn(3)), sp = exact_sin(turn(4)), cp = exact_cos(turn(4)),
-               sy = exact_sin(turn(5)), cy = exact_cos(turn(5));
-  const Mat3 body = product(Mat3{cy, -sy, 0, sy, cy, 0, 0, 0, 1},
-                            product(Mat3{cp, 0, sp, 0, 1, 0, -sp, 0, cp}, Mat3{1, 0, 0, 0, cr, -sr, 0, sr, cr}));
-  // The image's x, y and z in a body's axes (REP-103: x forward, y left, z up).
-  constexpr Mat3 kOptical = {0, 0, 1, -1, 0, 0, 0, -1, 0};
-  plan.mount = {product(body, kOptical), {numbers[0], numbers[1], numbers[2]}};
+  plan.parent = checked_frame("--ros-mount", text.substr(0, comma));
+  plan.mount = mounted_camera(*mount);
 }
 
 int domain_of(const RosOptions& options) {

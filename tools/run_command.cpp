@@ -34,6 +34,7 @@ constexpr const char* kExamples = R"(Examples:
   berth table                                    the paper's six-axis table, simulated: errors of every axis
   berth calibrate --board aprilgrid --grid 5x7 --size 0.03 --out cam.yaml images/
   berth survey --camera cam.yaml --marker-size 0.05 --out bundle.yaml images/
+  berth stations scenarios/stations.toml         the robot's and the dock's camera together
   berth config --explain                         the keys of a file for berth run --config
   berth doctor                                   what this machine has, and what it lacks
 
@@ -77,6 +78,7 @@ int run_command(int argc, const char* const* argv, Console& console) {
   add_print_tag(app, console, exit_code);
   add_plan(app, console, exit_code);
   add_soak(app, console, exit_code);
+  add_stations(app, console, exit_code);
   add_survey(app, console, exit_code);
   add_table(app, console, exit_code);
   add_doctor(app, console, exit_code);

@@ -48,24 +48,41 @@ class ConfigFile {
 
   /// The arguments of every key that is not among `given`.
   std::vector<std::string> arguments(const CLI::App& run, const std::set<const CLI::Option*>& given) const {
+    return arguments_of(table_, run, given, {}, "berth config --explain");
+  }
+
+  /// The same of one section, or of what stands beside all of them.
+  std::vector<std::string> section_arguments(const CLI::App& command, const std::set<const CLI::Option*>& given,
+                                             const std::string& section, const std::vector<std::string>& sections,
+                                             const std::string& help) const {
+    if (section.empty()) return arguments_of(table_, command, given, sections, help);
+    const toml::table* table = table_[section].as_table();
+    if (table == nullptr)
+      throw Error(path_ + ": the section [" + section + "] is missing; " + help + " has an example");
+    return arguments_of(*table, command, given, {}, help);
+  }
+
+ private:
+  std::vector<std::string> arguments_of(const toml::table& table, const CLI::App& run,
+                                        const std::set<const CLI::Option*>& given,
+                                        const std::vector<std::string>& sections, const std::string& help) const {
     const std::vector<const CLI::Option*> keys = keys_of(run);
     std::vector<std::string> all;
-    for (const auto& [key, node] : table_) {
+    for (const auto& [key, node] : table) {
       const std::string name(key.str());
+      if (std::find(sections.begin(), sections.end(), name) != sections.end()) continue;
       const auto is_named = [&](const CLI::Option* option) { return name_of(*option) == name; };
       const auto found = std::find_if(keys.begin(), keys.end(), is_named);
       if (found == keys.end()) {
-        std::vector<std::string> known;
+        std::vector<std::string> known = sections;
         for (const CLI::Option* option : keys) known.push_back(name_of(*option));
-        fail(node, name,
-             "is unknown; did you mean '" + near_names(name, known, 1) + "'? berth config --explain lists all keys");
+        fail(node, name, "is unknown; did you mean '" + near_names(name, known, 1) + "'? " + help + " lists all keys");
       }
       if (given.count(*found) == 0) add(**found, name, node, all);
     }
     return all;
   }
 
- private:
   [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& what) const {
     throw Error(fmt::format("{}:{}: field '{}' {}", path_, node.source().begin.line, key, what));
   }
@@ -132,6 +149,15 @@ std::vector<std::string> with_config(const CLI::App& run, std::vector<std::strin
   const std::vector<std::string> more = ConfigFile(path).arguments(run, given);
   arguments.insert(arguments.begin() + 1, more.begin(), more.end());
   return arguments;
+}
+
+std::vector<std::string> section_arguments(const std::string& path, const CLI::App& command, const std::string& section,
+                                           const std::vector<std::string>& sections, const std::string& help) {
+  std::set<const CLI::Option*> given;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() > 0) given.insert(option);
+  }
+  return ConfigFile(path).section_arguments(command, given, section, sections, help);
 }
 
 std::string explain_config(const CLI::App& run) {

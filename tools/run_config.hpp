@@ -14,6 +14,12 @@ namespace berth::cli {
 /// Throws Error naming file, line, key, value and remedy for a key that is no option, or a value that cannot be one's.
 std::vector<std::string> with_config(const CLI::App& run, std::vector<std::string> arguments);
 
+/// The arguments that one table of a file of several stands for: `section`'s, or for "" those at its top, beside which
+/// `sections` are. Options that `command` was given already are left out. `help`: where all keys are listed. Throws
+/// Error as with_config, and where the section is missing.
+std::vector<std::string> section_arguments(const std::string& path, const CLI::App& command, const std::string& section,
+                                           const std::vector<std::string>& sections, const std::string& help);
+
 /// Every key, as a TOML file of comments: what it is, its unit or kind, bounds and default.
 std::string explain_config(const CLI::App& run);
 
