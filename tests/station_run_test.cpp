@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -24,15 +27,16 @@ using testing::HasSubstr;
 const std::string kScenarios = BERTH_SOURCE_DIR "/scenarios/";
 const std::string kRobotPart = "source = \"sim:" + kScenarios +
                                "stations-robot.toml\"\nmarker = \"tag36h11:7\"\nsize = 0.08\n"
-                               "camera-at = \"0,0,0,0,0,0\"\nmarker-at = \"0,0,0,0,0,0\"\n";
-const std::string kDockPart = "source = \"sim:" + kScenarios +
-                              "stations-dock.toml\"\nmarker = \"tag36h11:9\"\nsize = 0.08\n"
-                              "camera-at = \"0,0.12,0,0,0,0\"\nmarker-at = \"0,-0.12,0,0,0,0\"\n";
+                               "corners = \"photometric\"\ncamera-at = \"0,0,0,0,0,0\"\nmarker-at = \"0,0,0,0,0,0\"\n";
+const std::string kDockPart =
+    "source = \"sim:" + kScenarios +
+    "stations-dock.toml\"\nmarker = \"tag36h11:9\"\nsize = 0.08\n"
+    "corners = \"photometric\"\ncamera-at = \"0,0.12,0,0,0,0\"\nmarker-at = \"0,-0.12,0,0,0,0\"\n";
 
 /// `frames`: of each station's.
 struct File {
   std::string top, robot, dock;
-  int robot_frames = 12, dock_frames = 12;
+  int robot_frames = 8, dock_frames = 8;
 };
 
 CommandRun run_stations(const ScratchFolder& folder, const File& file, const std::vector<std::string>& more = {}) {
@@ -59,18 +63,18 @@ Pose robot_by(const json& truth_marker) {
 
 TEST(StationRun, FusesBothViewsOfOneFlight) {
   const ScratchFolder folder;
-  const std::string robot_log = folder.path() + "/robot.jsonl", dock_log = folder.path() + "/dock.jsonl";
-  const CommandRun run = run_stations(folder, {"", "json = \"" + robot_log + "\"\n", "json = \"" + dock_log + "\"\n"},
-                                      {"--json", "-"});
+  const std::string robot_log = folder / "robot.jsonl", dock_log = folder / "dock.jsonl";
+  const CommandRun run =
+      run_stations(folder, {"", "json = \"" + robot_log + "\"\n", "json = \"" + dock_log + "\"\n"}, {"--json", "-"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("both   12 moments: 12 by both"));
-  EXPECT_THAT(run.err, HasSubstr("robot  12 frames, 12 with markers"));
+  EXPECT_THAT(run.err, HasSubstr("both   8 moments: 8 by both"));
+  EXPECT_THAT(run.err, HasSubstr("robot  8 frames, 8 with markers"));
   const std::vector<json> moments = run.lines();
   const std::vector<json> robot = CommandRun::json_lines(text_of(robot_log)),
                           dock = CommandRun::json_lines(text_of(dock_log));
-  ASSERT_EQ(moments.size(), 12u);
-  ASSERT_EQ(robot.size(), 12u);
-  ASSERT_EQ(dock.size(), 12u);
+  ASSERT_EQ(moments.size(), 8u);
+  ASSERT_EQ(robot.size(), 8u);
+  ASSERT_EQ(dock.size(), 8u);
   double squares = 0, fused_turn = 0, alone_turn = 0;
   for (std::size_t i = 0; i < moments.size(); ++i) {
     const json& moment = moments[i];
@@ -87,12 +91,12 @@ TEST(StationRun, FusesBothViewsOfOneFlight) {
     const auto error = step_between(pose_of(moment.at("pose")), truth);
     squares += mahalanobis(moment.at("pose").at("covariance"), error);
     fused_turn += dot({error[3], error[4], error[5]}, {error[3], error[4], error[5]});
-    const auto alone =
-        step_between(pose_of(robot[i].at("detections").at(0).at("pose")), pose_of(robot[i].at("truth").at(0).at("pose")));
+    const auto alone = step_between(pose_of(robot[i].at("detections").at(0).at("pose")),
+                                    pose_of(robot[i].at("truth").at(0).at("pose")));
     alone_turn += dot({alone[3], alone[4], alone[5]}, {alone[3], alone[4], alone[5]});
   }
-  // Chi-square of 72 degrees of freedom: within four deviations, above.
-  EXPECT_LT(squares, 72 + 4 * 12);
+  // Chi-square of 48 degrees of freedom, within four deviations.
+  EXPECT_NEAR(squares, 48, 4 * 9.8);
   EXPECT_LT(fused_turn, alone_turn);
 }
 
@@ -120,15 +124,41 @@ TEST(StationRun, GoesOnWithTheStationThatIsLeft) {
 
 TEST(StationRun, SaysThatAMountIsBent) {
   const ScratchFolder folder;
-  // The later of two keys would be an error: the file is written anew.
   std::string dock = kDockPart;
   dock.replace(dock.find("0,0.12,0,0,0,0"), 14, "0,0.12,0,5,0,0");
-  const std::string path = folder.write("stations.toml", "[robot]\n" + kRobotPart + "max-frames = 1\n[dock]\n" + dock +
-                                                             "max-frames = 1\n");
+  const std::string path =
+      folder.write("stations.toml", "[robot]\n" + kRobotPart + "max-frames = 1\n[dock]\n" + dock + "max-frames = 1\n");
   const CommandRun run = run_berth({"stations", path});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("THEY DISAGREE"));
   EXPECT_THAT(run.out, HasSubstr("the stations disagreed in 1"));
+}
+
+TEST(StationRun, TakesEachStationAtItsOwnPace) {
+  const ScratchFolder folder;
+  const std::string robot_log = folder / "robot.jsonl", dock_log = folder / "dock.jsonl";
+  // Half a period of the slower one, so that most find a partner; the robot's ends first.
+  const CommandRun run =
+      run_stations(folder,
+                   {"largest-difference-ms = 8\nwait-ms = 40\n", "fps = 60\njson = \"" + robot_log + "\"\n",
+                    "fps = 100\njson = \"" + dock_log + "\"\n", 4, 12},
+                   {"--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::ptrdiff_t robot = 0, dock = 0;
+  for (const json& moment : run.lines()) {
+    robot += moment.contains("robot") ? 1 : 0;
+    dock += moment.contains("dock") ? 1 : 0;
+    if (moment.contains("difference_ns")) {
+      EXPECT_LE(std::abs(moment["difference_ns"].get<std::int64_t>()), 8'000'000);
+    }
+  }
+  const auto frames_in = [](const std::string& log) {
+    const std::vector<json> lines = CommandRun::json_lines(text_of(log));
+    return std::count_if(lines.begin(), lines.end(), [](const json& line) { return line.contains("detections"); });
+  };
+  EXPECT_GT(dock, 0);
+  EXPECT_EQ(robot, frames_in(robot_log)) << "every frame is in a moment";
+  EXPECT_EQ(dock, frames_in(dock_log));
 }
 
 struct Refused {
@@ -159,9 +189,10 @@ TEST(StationRun, RefusesWhatMakesNoPair) {
 TEST(StationRun, EndsWhereOneStationDoesNotBegin) {
   const ScratchFolder folder;
   const std::string path = folder.write(
-      "stations.toml", "[robot]\n" + kRobotPart + "[dock]\nsource = \"file:" BERTH_TEST_DATA
-                       "/tag36h11_7.png\"\nmarker = \"tag36h11:7\"\nsize = 0.08\ncamera-at = \"0,0,0,0,0,0\"\n"
-                       "marker-at = \"0,0,0,0,0,0\"\n");
+      "stations.toml", "[robot]\n" + kRobotPart +
+                           "[dock]\nsource = \"file:" BERTH_TEST_DATA
+                           "/tag36h11_7.png\"\nmarker = \"tag36h11:7\"\nsize = 0.08\ncamera-at = \"0,0,0,0,0,0\"\n"
+                           "marker-at = \"0,0,0,0,0,0\"\n");
   const CommandRun run = run_berth({"stations", path});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("[dock] station dock: key 'camera' is missing"));
