@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "berth/error.hpp"
+#include "camera/sources.hpp"
 #include "commands.hpp"
 #include "frame_json.hpp"
 #include "interrupt.hpp"
@@ -131,6 +132,8 @@ class StationCommand {
     if (const std::size_t ids = family(target.family).codes.size(); static_cast<std::size_t>(target.id) >= ids) {
       refuse("marker", marker_, fmt::format("its ids are 0 to {}", ids - 1));
     }
+    const auto source = app_.get_subcommand("run")->get_option("--source")->as<std::string>();
+    target.is_live = names_camera(source) || stream.pace.fps != 0;
     target.camera = mounted_camera(mount("camera-at", camera_at_));
     target.marker = mounted_marker(mount("marker-at", marker_at_));
     if (stream.log == "-") throw Error("key 'json' is '-'; both stations would write there: name a file");

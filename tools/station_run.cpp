@@ -36,7 +36,7 @@ class StationRun::Observer final : public FrameObserver {
     const auto marker = std::find_if(all.begin(), all.end(), [&](const Detection& detection) {
       return detection.id == target_.id && detection.family->name == target_.family;
     });
-    run_.push(side_, frame.result.stamp, marker == all.end() ? nullptr : &*marker, frame.paced != nullptr);
+    run_.push(side_, frame.result.stamp, marker == all.end() ? nullptr : &*marker, target_.is_live);
   }
 
  private:

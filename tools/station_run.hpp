@@ -12,11 +12,13 @@
 
 namespace berth::cli {
 
-/// The marker that a station's camera looks at, and where both are mounted.
+/// The marker that a station's camera looks at, where both are mounted, and whether frames come at a pace of their own,
+/// so that they cannot wait.
 struct StationTarget {
   std::string family;
   int id = 0;
   Pose camera, marker;
+  bool is_live = false;
 };
 
 /// Where two streams, each on a thread of its own, hand over what they read, and one thread takes the moments that

@@ -1,8 +1,9 @@
-// A GigE Vision camera on 127.0.0.1, Aravis' own fake one with the serial number GV77, that shows a source's frames in
+// A GigE Vision camera on the loopback interface, Aravis' own fake one with the serial number GV77, that shows a source's frames in
 // turn:
 //   fake_gige_camera SOURCE FRAMES [KEY=VALUE...]
 // It is there once it has written a line, and until its standard input ends. A number on a line there: so many frames
 // more, then it is silent. Keys:
+//   address=A   of the interface, 127.0.0.1 unless given: one camera has each
 //   lost=SHARE  of the packets, which it loses on the way
 //   nodes=FILE  of GenICam nodes that it has besides its own
 //   sent=FILE   where it writes each frame's time as it takes it, a line each, whatever becomes of the process
@@ -92,10 +93,11 @@ int main(int argc, char** argv) try {
     if (show.sent < 0) throw std::invalid_argument(keys["sent"] + ": it cannot be written");
   }
   const std::string description = keys.count("nodes") > 0 ? describe(keys["nodes"]) : "";
+  const std::string address = keys.count("address") > 0 ? keys["address"] : "127.0.0.1";
   ArvGvFakeCamera* camera =
-      arv_gv_fake_camera_new_full("127.0.0.1", "GV77", description.empty() ? nullptr : description.c_str());
+      arv_gv_fake_camera_new_full(address.c_str(), "GV77", description.empty() ? nullptr : description.c_str());
   if (arv_gv_fake_camera_is_running(camera) == 0) {
-    return std::fprintf(stderr, "UDP port 3956 of 127.0.0.1 cannot be had\n"), 1;
+    return std::fprintf(stderr, "UDP port 3956 of %s cannot be had\n", address.c_str()), 1;
   }
   show.camera = camera;
   if (keys.count("lost") > 0) lose(camera, std::stod(keys["lost"]));
