@@ -185,10 +185,10 @@ Scene scene(sim::Random& random) {
     station.corner_deviation_px = kNoise_px;
     StationFrame& frame = scene.moment.frames[static_cast<std::size_t>(side)];
     Detection& marker = frame.marker;
-    marker.corners = with_noise(seen_corners(station.lens, side == kRobot ? to_robot : to_dock, kSide_m), kNoise_px,
-                                random);
-    marker.has_pose = marker_pose(station.lens, kSide_m, kNoise_px, marker.corners, marker.pose,
-                                  marker.pose_uncertainty.emplace());
+    marker.corners =
+        with_noise(seen_corners(station.lens, side == kRobot ? to_robot : to_dock, kSide_m), kNoise_px, random);
+    marker.has_pose =
+        marker_pose(station.lens, kSide_m, kNoise_px, marker.corners, marker.pose, marker.pose_uncertainty.emplace());
     frame.sees = true;
   }
   scene.moment.came = {true, true};

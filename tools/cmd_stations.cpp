@@ -55,8 +55,7 @@ void add_options(CLI::App& command, Options& options) {
       ->type_name("MS")
       ->check(CLI::Range(1.0, 10000.0))
       ->capture_default_str();
-  command
-      .add_option("--gate", options.gate, "the stations disagree above this chi-square of 6 degrees of freedom")
+  command.add_option("--gate", options.gate, "the stations disagree above this chi-square of 6 degrees of freedom")
       ->type_name("X")
       ->check(CLI::Range(0.0, 1e9))
       ->capture_default_str();
@@ -232,10 +231,11 @@ class Moments {
   }
 
   void sum_up(StationRun& run) {
-    people_ << fmt::format("{} moment{}: {} by both, {} by the robot's camera alone, {} by the dock's alone, {} without "
-                           "a pose; the stations disagreed in {}\n",
-                           moments_, moments_ == 1 ? "" : "s", by_both_, by_robot_, by_dock_,
-                           moments_ - by_both_ - by_robot_ - by_dock_, disagreed_);
+    people_ << fmt::format(
+        "{} moment{}: {} by both, {} by the robot's camera alone, {} by the dock's alone, {} without "
+        "a pose; the stations disagreed in {}\n",
+        moments_, moments_ == 1 ? "" : "s", by_both_, by_robot_, by_dock_, moments_ - by_both_ - by_robot_ - by_dock_,
+        disagreed_);
     people_ << fmt::format("largest difference of paired mid-exposures {:.3f} ms\n", ms_of(largest_difference_ns_));
     for (const StationSide side : {StationSide::robot, StationSide::dock}) {
       const StationCounts counts = run.counts(side);

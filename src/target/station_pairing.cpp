@@ -39,7 +39,8 @@ void check_clock(StationSide side, const char* clock, const std::string& so_far)
   const std::string_view name = clock;
   const auto who = [&] { return std::string("station ") + name_of(side) + ": "; };
   if (name == "none") {
-    throw Error(who() + "its frames have no times, so they cannot be paired; use a video, a recording or a live source");
+    throw Error(who() +
+                "its frames have no times, so they cannot be paired; use a video, a recording or a live source");
   }
   if (name == "camera") {
     throw Error(who() +

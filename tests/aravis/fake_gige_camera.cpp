@@ -1,5 +1,5 @@
-// A GigE Vision camera on the loopback interface, Aravis' own fake one with the serial number GV77, that shows a source's frames in
-// turn:
+// A GigE Vision camera on the loopback interface, Aravis' own fake one with the serial number GV77, that shows a
+// source's frames in turn:
 //   fake_gige_camera SOURCE FRAMES [KEY=VALUE...]
 // It is there once it has written a line, and until its standard input ends. A number on a line there: so many frames
 // more, then it is silent. Keys:
