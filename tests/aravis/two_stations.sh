@@ -38,7 +38,7 @@ distortion_model: plumb_bob
 distortion_coefficients: {rows: 1, cols: 5, data: [-0.1116, 0.1242, 0, 0, 0]}
 END
 station() { # ADDRESS ID CAMERA_AT MARKER_AT
-  echo "source = \"aravis:$1,width=640,height=480,fps=30,exposure_us=2000\""
+  echo "source = \"aravis:$1,width=640,height=480,fps=30,exposure_us=2000,repeats=on\""
   echo "camera = \"$folder/camera.yaml\""
   echo "marker = \"tag36h11:$2\""
   echo "size = 0.08"
