@@ -82,6 +82,24 @@ TEST(Soak, ALostDeviceIsNotAskedForFramesOfAnotherSize) {
   EXPECT_GE(outcome.tally.camera.reopened, 2U);
 }
 
+// For five seconds, which leaves a busy machine the time to open it anew.
+TEST(Soak, ADeviceThatHangsIsLeftAndGoneBackTo) {
+  SoakScenario scenario = short_scenario();
+  scenario.backend_fault = BackendFault::hung;
+  scenario.backend_fault_frame = 3;
+  scenario.fail_back = scenario.known_answers = true;
+  scenario.in_real_time = scenario.film.in_real_time = true;
+  scenario.frames = scenario.film.frames = 300;
+  scenario.frames_per_second = scenario.film.frames_per_second = 60;
+  scenario.film.share = 0;
+  const SoakOutcome outcome = run_scenario(scenario, SoakBackends());
+  for (const SoakViolation& violation : outcome.violations) ADD_FAILURE() << violation.what;
+  EXPECT_EQ(outcome.tally.frames + outcome.tally.dropped, 300U);
+  EXPECT_EQ(outcome.tally.devices_hung, 1U);
+  EXPECT_EQ(outcome.tally.failed_over, 1U);
+  EXPECT_EQ(outcome.tally.returned, 1U);
+}
+
 // By the disk's end, and by threads that stand still.
 TEST(Soak, DiskAndThreadsMayFail) {
   SoakScenario scenario = short_scenario();

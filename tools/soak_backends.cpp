@@ -1,5 +1,6 @@
 #include "soak_backends.hpp"
 
+#include <array>
 #include <chrono>
 #include <thread>
 #include <utility>
@@ -10,7 +11,7 @@
 namespace berth::cli {
 namespace {
 
-constexpr std::chrono::milliseconds kStall{120};
+constexpr std::chrono::milliseconds kStall{120}, kHang{700};
 /// A scenario's device hangs so often, at frames so far apart.
 constexpr int kStalls = 3, kStallEvery = 20;
 
@@ -29,6 +30,20 @@ class StallingStream final : public test::ForwardingStream {
 
  private:
   int next_, replays_ = 0, stalls_ = 0;
+};
+
+/// Has nothing ready for a while once; kernels have long run by then, as they may have on a device whose driver hangs.
+class HangingStream final : public test::ForwardingStream {
+ public:
+  HangingStream(std::unique_ptr<Stream> behind, int frame) : ForwardingStream(std::move(behind)), frame_(frame) {}
+  bool is_immediate() const override { return false; }
+  bool finish() override {
+    if (finishes_++ == frame_) std::this_thread::sleep_for(kHang);
+    return behind().finish();
+  }
+
+ private:
+  int frame_, finishes_ = 0;
 };
 
 using Streams = std::unique_ptr<Stream>;
@@ -64,6 +79,12 @@ EngineBackends SoakBackends::lend(const SoakScenario& scenario) const {
       engine.backends.push_back(test::make_faulty_backend(first, fault));
       break;
     }
+    case BackendFault::hung:
+      engine.backends.push_back(std::make_unique<test::ForwardingBackend>(
+          first.name(), first, [frame = scenario.backend_fault_frame](Streams stream) {
+            return std::make_unique<HangingStream>(std::move(stream), frame);
+          }));
+      break;
     case BackendFault::stalled:
       engine.backends.push_back(std::make_unique<test::ForwardingBackend>(
           first.name(), first, [frame = scenario.backend_fault_frame](Streams stream) {
@@ -71,8 +92,12 @@ EngineBackends SoakBackends::lend(const SoakScenario& scenario) const {
           }));
       break;
   }
-  if (scenario.lockstep || scenario.backend_fault == BackendFault::lost) {
-    engine.backends.push_back(lent(at(scenario.second)));
+  if (scenario.lockstep || scenario.loses_backend()) engine.backends.push_back(lent(at(scenario.second)));
+  if (scenario.fail_back) {
+    // Without the fault: the device was reset meanwhile.
+    engine.reopen = [this, names = std::array{scenario.backend, scenario.second}](std::size_t i) {
+      return lent(at(names.at(i)));
+    };
   }
   return engine;
 }

@@ -93,6 +93,7 @@ void SoakCheck::observe(const ObservedFrame& frame) {
     return;
   }
   failed_over_ = failed_over_ || frame.engine.mode == HealthMode::fallback;
+  returns_ = std::max(returns_, frame.engine.returns);
   check_place(frame, *filmed);
   check_status(frame, *filmed);
   check_poses(frame, *filmed);
@@ -131,8 +132,8 @@ void SoakCheck::check_status(const ObservedFrame& frame, const FilmedFrame& film
   }
   const bool is_flat = filmed.fault == CameraFault::black || filmed.fault == CameraFault::white;
   if (is_flat && any) complain(filmed, "a marker in a frame of one grey level");
-  // A device that is lost while it is asked gives a wrong one.
-  if (frame.engine.wrong_answers > 0 && scenario_.backend_fault != BackendFault::lost && !said_unwell_) {
+  // A device that is lost or hangs while it is asked gives a wrong one.
+  if (frame.engine.wrong_answers > 0 && !scenario_.loses_backend() && !said_unwell_) {
     complain(filmed, "a wrong known answer");
     said_unwell_ = true;
   }

@@ -40,6 +40,8 @@ class SoakCheck final : public FrameObserver {
   /// Frames that were compared with a plain detector's.
   u64 compared() const { return compared_; }
   bool failed_over() const { return failed_over_; }
+  /// How often a backend that was left has taken over again.
+  u64 returns() const { return returns_; }
 
  private:
   void complain(const FilmedFrame& filmed, const std::string& what);
@@ -62,7 +64,7 @@ class SoakCheck final : public FrameObserver {
   GrayImage drawn_;
   std::optional<FrameStamp> last_;
   int last_clock_ = 0;
-  u64 frames_ = 0, poses_ = 0, compared_ = 0;
+  u64 frames_ = 0, poses_ = 0, compared_ = 0, returns_ = 0;
   bool failed_over_ = false, said_unwell_ = false;
 };
 

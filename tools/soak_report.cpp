@@ -16,14 +16,16 @@ namespace {
 constexpr std::size_t kViolationsKept = 100;
 
 using Count = u64 SoakTally::*;
-constexpr std::array<std::pair<const char*, Count>, 13> kCounts = {{
+constexpr std::array<std::pair<const char*, Count>, 15> kCounts = {{
     {"scenarios", &SoakTally::scenarios},
     {"frames", &SoakTally::frames},
     {"compared", &SoakTally::compared},
     {"dropped", &SoakTally::dropped},
     {"poses", &SoakTally::poses},
     {"devices_lost", &SoakTally::devices_lost},
+    {"devices_hung", &SoakTally::devices_hung},
     {"failed_over", &SoakTally::failed_over},
+    {"returned", &SoakTally::returned},
     {"devices_stalled", &SoakTally::devices_stalled},
     {"threads_stopped", &SoakTally::threads_stopped},
     {"recordings", &SoakTally::recordings},
@@ -173,8 +175,9 @@ void print(std::ostream& out, const SoakReport& report) {
     out << fmt::format("| camera: {} | {} | {} |\n", name_of(fault), t.camera_faults[i], fate_of(fault));
   }
   out << fmt::format(
-      "| device to be lost | {} | in {} scenarios it came to that: another backend carried on, same bits |\n",
-      t.devices_lost, t.failed_over);
+      "| device to be lost, or to hang | {} and {} | in {} scenarios it came to that: another backend carried on, same "
+      "bits; in {} it took over again |\n",
+      t.devices_lost, t.devices_hung, t.failed_over, t.returned);
   out << fmt::format("| device stalled | {} scenarios | late or dropped, counted |\n", t.devices_stalled);
   out << fmt::format("| thread stopped for 100 ms | {} | late or dropped, counted |\n", t.threads_stopped);
   out << fmt::format("| disk full | {} of {} recordings | said, frames went on; {} recovered, the rest whole |\n\n",

@@ -24,6 +24,8 @@ namespace {
 
 /// Between known answers, s: a scenario takes a second or so.
 constexpr double kKnownAnswerS = 0.3;
+/// Nothing from a device for so long is a hang; so soon one that was left is tried again.
+constexpr double kHangMs = 250, kFailBackS = 0.05;
 
 /// A file system that is full after so many bytes of a file, while it lives.
 class FullDisk {
@@ -116,6 +118,8 @@ class ScenarioRun {
     options.track = s_.track;
     options.max_frames = s_.frames;
     if (s_.known_answers) options.known_answer_s = kKnownAnswerS;
+    if (s_.fail_back) options.fail_back_s = kFailBackS;
+    if (s_.backend_fault == BackendFault::hung) options.hang_ms = kHangMs;
     options.pace.stream = s_.in_real_time;
     // For its counts at the end.
     if (s_.in_real_time) options.log = path("log.jsonl");
@@ -154,8 +158,10 @@ class ScenarioRun {
     tally.poses = check->poses();
     tally.threads_stopped = starver->stopped();
     tally.devices_lost = s_.backend_fault == BackendFault::lost ? 1 : 0;
+    tally.devices_hung = s_.backend_fault == BackendFault::hung ? 1 : 0;
     tally.devices_stalled = s_.backend_fault == BackendFault::stalled ? 1 : 0;
     tally.failed_over = check->failed_over() ? 1 : 0;
+    tally.returned = check->returns() > 0 ? 1 : 0;
     read_complaints(err.str());
   }
 
@@ -168,7 +174,8 @@ class ScenarioRun {
           has("film: the camera is not back yet")) {
         continue;
       }
-      if (has(" was left: ") && s_.backend_fault == BackendFault::lost) continue;
+      if (has(" was left: ") && s_.loses_backend()) continue;
+      if (has(" opened anew and gives right answers") && s_.fail_back) continue;
       // A resized frame's.
       if (has("no pose; use images as the camera was calibrated")) continue;
       if (s_.disk_bytes > 0 && has("run.mcap: ") && has("free some space")) {
@@ -315,7 +322,9 @@ void SoakTally::add(const SoakTally& other) {
   camera.misdated += other.camera.misdated;
   camera.reopened += other.camera.reopened;
   devices_lost += other.devices_lost;
+  devices_hung += other.devices_hung;
   failed_over += other.failed_over;
+  returned += other.returned;
   devices_stalled += other.devices_stalled;
   threads_stopped += other.threads_stopped;
   recordings += other.recordings;

@@ -22,7 +22,7 @@ struct SoakTally {
   /// Camera faults that began, by kind; and what the camera's source counted.
   std::array<u64, kCameraFaults> camera_faults = {};
   SourceHealth camera;
-  u64 devices_lost = 0, failed_over = 0, devices_stalled = 0;
+  u64 devices_lost = 0, devices_hung = 0, failed_over = 0, returned = 0, devices_stalled = 0;
   u64 threads_stopped = 0;
   u64 recordings = 0, replayed = 0, disks_full = 0, recovered = 0;
   /// Scenarios of each configuration that there is: "tracked", "on simd", …

@@ -124,7 +124,12 @@ void draw_engine(SoakScenario& s, sim::Random& random, const std::vector<std::st
   s.known_answers = !s.lockstep && random.chance(0.3);
   if (!s.lockstep && is_quick && random.chance(0.35)) {
     s.backend_fault = random.chance(0.6) ? BackendFault::lost : BackendFault::stalled;
+    // Who hangs is told by the pipeline alone.
+    if (s.in_real_time && random.chance(0.4)) s.backend_fault = BackendFault::hung;
     s.backend_fault_frame = random.integer(2, static_cast<int>(s.frames) - 10);
+    s.fail_back = s.loses_backend() && random.chance(0.6);
+    // A backend is believed again by its known answers.
+    s.known_answers = s.known_answers || s.fail_back;
   }
   if (!is_quick || (s.second != "simd" && s.second != "cpu")) s.frames = std::min<u64>(s.frames, 60);
 }
@@ -189,7 +194,9 @@ std::string SoakScenario::describe() const {
   add(digests, "digests");
   add(known_answers, "known answers");
   add(backend_fault == BackendFault::lost, "its device lost");
+  add(backend_fault == BackendFault::hung, "its device hung");
   add(backend_fault == BackendFault::stalled, "its device stalled");
+  add(fail_back, "gone back to");
   add(record, disk_bytes > 0 ? fmt::format("recorded, disk full after {} kB", disk_bytes / 1000) : "recorded");
   add(!starved.empty(), "threads starved");
   return text;

@@ -13,7 +13,8 @@ namespace berth::cli {
 enum class BackendFault {
   none,
   lost,     ///< its device is lost in the middle; another one carries on
-  stalled,  ///< it hangs for a while, more than once
+  hung,     ///< nothing comes from it for longer than is waited for; another one carries on
+  stalled,  ///< it is slow for a while, more than once; nobody leaves it
 };
 
 /// A marker of a scenario's body.
@@ -44,6 +45,8 @@ struct SoakScenario {
   BackendFault backend_fault = BackendFault::none;
   /// The frame of it.
   int backend_fault_frame = 0;
+  /// A device that was left is opened anew and gone back to.
+  bool fail_back = false;
 
   bool record = false;
   RecordPictures recorded = RecordPictures::raw;
@@ -56,6 +59,8 @@ struct SoakScenario {
   /// The rest of what is seen, as docs/simulator.md has it, but for the camera's file of a fisheye.
   std::string toml;
 
+  /// Whether another backend is to carry on.
+  bool loses_backend() const { return backend_fault == BackendFault::lost || backend_fault == BackendFault::hung; }
   /// What it is, in a line.
   std::string describe() const;
 };
