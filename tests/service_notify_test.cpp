@@ -6,11 +6,15 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "recording/recover.hpp"
 #include "support/command_run.hpp"
 
 namespace berth {
@@ -69,6 +73,24 @@ TEST(ServiceNotify, FramesFeedTheWatchdogByASocketsPathOrItsAbstractName) {
   Manager manager("berth-test-" + std::to_string(getpid()), true);
   EXPECT_EQ(run_berth({"run", "--source", kFrames, "--max-frames", "2"}).exit_code, 0);
   expect_told(manager.messages());
+}
+
+// What `systemctl stop` and `docker stop` send: the run ends with its summary, and the recording is whole.
+TEST(ServiceNotify, ASignalToEndEndsTheRunAsCtrlCDoes) {
+  const test::ScratchFolder folder;
+  Manager manager(folder / "notify", false);
+  std::thread systemd([&] {
+    while (manager.messages().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    kill(getpid(), SIGTERM);
+  });
+  const std::string recording = folder / "run.mcap";
+  const test::CommandRun run =
+      run_berth({"run", "--source", kFrames, "--fps", "30", "--minutes", "5", "--record", recording});
+  systemd.join();
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("interrupted\n"));
+  EXPECT_EQ(manager.messages().back(), "STOPPING=1");
+  EXPECT_TRUE(mcap::examine(recording).whole);
 }
 
 TEST(ServiceNotify, WithoutFramesNothingIsSaid) {
