@@ -175,7 +175,9 @@ void add_plan(CLI::App& app, Console& console, int& exit_code) {
   command->add_option("--angle", options->angle_deg, "tilt of the marker, degrees")
       ->check(CLI::Range(0.0, 80.0))
       ->capture_default_str();
-  command->add_option("--camera", options->engine.camera_file, "camera_info YAML [the paper's, 640 × 480]")
+  command
+      ->add_option("--camera", options->engine.camera_file,
+                   "camera file: ROS, Kalibr or PhotonVision [the paper's, 640 × 480]")
       ->type_name("FILE");
   command->add_option("--lens", options->lens_mm, "focal length, mm, in place of --camera")
       ->check(CLI::Range(0.1, 1e4));

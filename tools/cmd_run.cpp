@@ -129,14 +129,15 @@ void add_run(CLI::App& app, Console& console, int& exit_code, const RunPart& par
       ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  command
-      ->add_option(
-          "--hang-after", options->stream.hang_ms,
-          "at a camera's pace: a device that a frame is waited for longer than this gives way to --fallback as "
-          "one that is lost; 0 waits for as long as it takes")
-      ->type_name("MS")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
+  CLI::Option* hang_after =
+      command
+          ->add_option("--hang-after", options->stream.hang_ms,
+                       "a device that a frame is waited for longer than this gives way to --fallback as one that is "
+                       "lost; 0 waits for as long as it takes")
+          ->type_name("MS")
+          ->check(CLI::Range(0.0, 1e6))
+          ->group(kPaceGroup)
+          ->capture_default_str();
   add_record_options(*command, options->record);
   add_report_option(*command, options->web);
   add_view_options(*command, options->web);
@@ -164,6 +165,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code, const RunPart& par
                             ->excludes(fps);
   std::vector<CLI::Option*> pipeline = add_pace_options(*command, pace);
   pipeline.push_back(behind);
+  pipeline.push_back(hang_after);
   add_ros_options(*command, options->ros);
   add_engine_options(*command, options->stream.engine);
   add_deviation_options(*command, options->stream.engine);
@@ -190,6 +192,10 @@ void add_run(CLI::App& app, Console& console, int& exit_code, const RunPart& par
           "the two out");
     }
     if (known_answer->count() == 0 && (is_camera || given.fps != 0)) options->stream.known_answer_s = kKnownAnswerS;
+    if (options->stream.fail_back_s > 0 && !options->stream.engine.lockstep.empty()) {
+      throw Error(
+          "--fail-back goes back to a backend that was left, and --lockstep leaves none; leave one of the two out");
+    }
     if (options->stream.fail_back_s > 0 && options->stream.known_answer_s == 0) {
       throw Error("--fail-back believes a backend again by its known answers; give --known-answer SECONDS, too");
     }

@@ -95,15 +95,17 @@ void add_engine_options(CLI::App& command, EngineOptions& options) {
 }
 
 void add_stream_backend_options(CLI::App& command, EngineOptions& options) {
-  command
-      .add_option("--lockstep", options.lockstep,
-                  "two backends that both run every frame, bit against bit, e.g. simd,opencl (slow)")
-      ->type_name("A,B");
+  CLI::Option* lockstep = command
+                              .add_option("--lockstep", options.lockstep,
+                                          "two backends that both run every frame, bit against bit, e.g. simd,opencl "
+                                          "(slow)")
+                              ->type_name("A,B");
   command
       .add_option(
           "--fallback", options.fallback,
           "backend that runs the frame again when a device is lost, or none [simd, for a backend with a driver]")
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->excludes(lockstep);
 }
 
 namespace {

@@ -27,8 +27,8 @@ constexpr const char* kExamples = R"(Examples:
   berth recover flight.mcap                      after a loss of power: all that is whole
   berth verify                                   every backend against the reference, bit by bit
   berth bench --explain                          how long a frame takes on each backend, and where
-  berth eval lite.berthnet sets/disjoint         how well a navigation network knows the target
-  berth model show lite.berthnet                 its layers, with their sizes and costs
+  berth eval models/lite.berthnet sets/disjoint  how well a navigation network knows the target
+  berth model show models/lite.berthnet          its layers, with their sizes and costs
   berth print-tag tag36h11 7 --size 0.08 --out tag.pdf   a marker on paper, at true size
   berth plan --size 0.08                         predicted pose errors, decode range, frame rate
   berth table                                    the paper's six-axis table, simulated: errors of every axis
@@ -38,8 +38,8 @@ constexpr const char* kExamples = R"(Examples:
   berth config --explain                         the keys of a file for berth run --config
   berth doctor                                   what this machine has, and what it lacks
 
-Exit codes: 0 all well; 1 verify, eval or replay found a difference, a flight did not dock, or
-calibrate or survey refused the views; 2 bad input or usage.)";
+Exit codes: 0 all well; 1 verify, eval, replay or run --lockstep found a difference, a flight did not dock,
+calibrate or survey refused the views, chaos or soak found what must not be; 2 bad input or usage.)";
 
 /// "a, b or c": the commands below one; empty where there are none.
 std::string choices_of(const CLI::App& command) {
