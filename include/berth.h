@@ -187,8 +187,7 @@ typedef enum berth_frame_status {
   BERTH_FRAME_OK = 0,
   BERTH_FRAME_NO_TARGET = 1,
   BERTH_FRAME_OVERFLOW = 2, /**< a list ran full: what is given holds, but something may be missing */
-  BERTH_FRAME_LATE = 3,
-  BERTH_FRAME_DEVICE_LOST = 4
+  BERTH_FRAME_DEVICE_LOST = 3
 } berth_frame_status;
 
 /** What became of a frame. */

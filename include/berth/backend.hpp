@@ -93,6 +93,7 @@ class Backend {
   virtual ~Backend() = default;
   virtual const char* name() const = 0;
   virtual DeviceInfo device() const = 0;
+  /// These three throw Error where the device has no memory left or is lost, and with a kernel that it cannot compile.
   virtual std::unique_ptr<Buffer> make_buffer(std::size_t bytes) = 0;
   virtual std::unique_ptr<Stream> make_stream() = 0;
   /// Prepares the steps for replay; their buffers must be this backend's and outlive the plan.

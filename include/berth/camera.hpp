@@ -32,7 +32,8 @@ struct CameraModel {
   std::array<double, 2> undistort(double u_px, double v_px) const;
 };
 
-/// Table 2 of the paper (a 1280 × 960 image), halved for 640 × 480 with the pixel centre convention kept.
+/// Table 2 of the paper (a 1280 × 960 image), scaled with the pixel centre convention kept. Throws Error unless width
+/// to height is 4 to 3.
 CameraModel paper_camera(int width = 640, int height = 480);
 
 /// The camera when its whole image is resized. Throws Error unless the sides' ratio stays, to a pixel.

@@ -99,7 +99,8 @@ class Detector {
   /// Enqueues a frame. Copies the image; returns at once where the device is asynchronous. One frame in flight.
   /// With `windows`, these alone are searched: a marker well inside one of them is found with the bits that the whole
   /// frame gives it, and no other is reported. The image is then not copied but read until collect returns. Throws
-  /// Error on windows that the detector was not made for or that do not lie in the frame as they must.
+  /// Error on an image of another size, and on windows that the detector was not made for or that do not lie in the
+  /// frame as they must.
   void submit(View2D<const u8> image, const FrameStamp& stamp, const std::vector<SearchWindow>& windows = {});
   /// Waits for the submitted frame and finishes it on the host. Valid until the next collect.
   const FrameResult& collect();

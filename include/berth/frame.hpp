@@ -13,10 +13,16 @@
 
 namespace berth {
 
-enum class FrameStatus { ok, no_target, overflow, late, device_lost };
+enum class FrameStatus {
+  ok,           ///< markers, and room for all that was looked at
+  no_target,    ///< nothing was found
+  overflow,     ///< a list ran full: what is given holds, more may have been there (FrameResult::capacities)
+  device_lost,  ///< no backend was left that could run it: nothing is given
+};
 const char* name_of(FrameStatus status);
 
-/// Where and when a frame came from. Times are nanoseconds on the named clock.
+/// Where and when a frame came from. Times are nanoseconds on the named clock: "monotonic" (the host's), "camera",
+/// "ptp", "ros", "video" (from its beginning), "simulation", "caller's", or "none".
 struct FrameStamp {
   u64 sequence = 0;
   std::int64_t exposure_start_ns = 0;

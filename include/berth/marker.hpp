@@ -85,10 +85,12 @@ struct CornerFit {
 struct Detection {
   const MarkerFamily* family = nullptr;
   int id = 0;
+  /// Bits that were read other than the code has them.
   int hamming = 0;
   /// Mean distance of the bits from their threshold, grey levels: how sure the decoding is.
   double margin = 0;
   std::array<std::array<double, 2>, 4> corners = {};
+  /// Where the diagonals meet, px: the image of the square's centre.
   std::array<double, 2> center = {};
   /// Of the corners, from what they were found by (docs/corners.md). Empty where a Detector did not make this.
   std::optional<CornerCovariance> corner_covariance_px2;
@@ -100,7 +102,8 @@ struct Detection {
   std::optional<PoseUncertainty> pose_uncertainty;
 };
 
-/// Makes the pose that of a marker `factor` times as large, which gives the same image.
+/// Makes the pose, with its other solution and covariances, that of a marker `factor` times as large, which gives the
+/// same image.
 void scale_pose(double factor, Detection& detection);
 
 }  // namespace berth

@@ -24,7 +24,7 @@ struct PoseFilterConfig {
   /// A frame whose corners fit nothing foreseen by more than this is kept out: chi-square of 8 degrees of freedom,
   /// exceeded by one frame in 30,000 where the model holds.
   double gate = 35;
-  /// So many frames kept out in a row begin anew.
+  /// More frames than so many kept out in a row begin anew.
   int most_outliers = 5;
   /// The track ends after this time without a marker, s.
   double lost_s = 0.5;

@@ -60,7 +60,8 @@ struct SourceHealth {
 };
 
 /// Where frames come from: `sim:FILE`, `dir:DIR`, `file:IMAGE`, `video:FILE`, `mcap:FILE`, `v4l2:CAMERA`,
-/// `aravis:CAMERA`, `gst:PIPELINE`.
+/// `aravis:CAMERA`, `gst:PIPELINE`. Opened by the command and the Python module; an installed Berth has the interface
+/// alone, for sources of one's own.
 class Source {
  public:
   virtual ~Source() = default;

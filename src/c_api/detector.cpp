@@ -55,7 +55,6 @@ berth_frame frame_of(const FrameResult& result, bool whole) {
   frame.mid_exposure_ns = result.stamp.mid_exposure_ns;
   static_assert(static_cast<int>(FrameStatus::no_target) == BERTH_FRAME_NO_TARGET &&
                 static_cast<int>(FrameStatus::overflow) == BERTH_FRAME_OVERFLOW &&
-                static_cast<int>(FrameStatus::late) == BERTH_FRAME_LATE &&
                 static_cast<int>(FrameStatus::device_lost) == BERTH_FRAME_DEVICE_LOST);
   frame.status = static_cast<int32_t>(result.status);
   frame.whole = whole ? 1 : 0;

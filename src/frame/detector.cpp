@@ -30,8 +30,6 @@ const char* name_of(FrameStatus status) {
       return "no_target";
     case FrameStatus::overflow:
       return "overflow";
-    case FrameStatus::late:
-      return "late";
     case FrameStatus::device_lost:
       return "device_lost";
   }
