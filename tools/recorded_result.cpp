@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "berth/error.hpp"
+#include "camera/recorded_number.hpp"
 
 namespace berth::cli {
 namespace {
@@ -48,8 +49,8 @@ PoseUncertainty uncertainty_of(const Json& json) {
 Detection detection_of(const Json& json) {
   Detection detection;
   detection.family = &family(json.at("family").get<std::string>());
-  detection.id = json.at("id").get<int>();
-  detection.hamming = json.at("hamming").get<int>();
+  detection.id = whole_number<int>(json, "id");
+  detection.hamming = whole_number<int>(json, "hamming");
   detection.margin = json.at("margin").get<double>();
   detection.corners = json.at("corners").get<std::array<std::array<double, 2>, 4>>();
   detection.center = json.at("center").get<std::array<double, 2>>();
@@ -64,7 +65,7 @@ Detection detection_of(const Json& json) {
 template <class Posed>
 Posed posed(const Json& json) {
   Posed one;
-  one.used = json.at("used").get<int>();
+  one.used = whole_number<int>(json, "used");
   one.has_pose = json.contains("pose");
   if (!one.has_pose) return one;
   one.pose = pose_of(json.at("pose"));
@@ -87,7 +88,7 @@ DiscPose disc_pose(const Json& json) {
 TruthMarker truth_marker(const Json& json) {
   TruthMarker marker;
   marker.family = json.at("family").get<std::string>();
-  marker.id = json.at("id").get<int>();
+  marker.id = whole_number<int>(json, "id");
   marker.size_m = json.at("size").get<double>();
   marker.pose = pose_of(json.at("pose"));
   return marker;
@@ -99,9 +100,9 @@ TrackedFrame tracked_frame(const Json& json) {
   tracked.why = named<SearchReason>(json.at("why").get<std::string>(), kSearchReasons);
   for (const Json& window : json.at("windows")) {
     SearchWindow& one = tracked.windows.emplace_back();
-    one.x = window.at("x").get<int>();
-    one.y = window.at("y").get<int>();
-    one.side = window.at("side").get<int>();
+    one.x = whole_number<int>(window, "x");
+    one.y = whole_number<int>(window, "y");
+    one.side = whole_number<int>(window, "side");
   }
   return tracked;
 }
@@ -120,15 +121,15 @@ RecordedResult::RecordedResult(const Json& record, const DetectorConfig& config,
 }
 
 void RecordedResult::read(const Json& record, const DetectorConfig& config) {
-  result_.stamp.sequence = record.at("frame").get<u64>();
-  result_.stamp.mid_exposure_ns = record.at("mid_exposure_ns").get<std::int64_t>();
+  result_.stamp.sequence = whole_number<u64>(record, "frame");
+  result_.stamp.mid_exposure_ns = whole_number<std::int64_t>(record, "mid_exposure_ns");
   // Whose clock it was says nothing any more.
   result_.stamp.clock = record.at("clock").get<std::string>() == "none" ? "none" : "recorded";
   label_ = record.at("label").get<std::string>();
   constexpr std::size_t kStatuses = static_cast<std::size_t>(FrameStatus::device_lost) + 1;
   result_.status = named<FrameStatus>(record.at("status").get<std::string>(), kStatuses);
   mode_ = named<Mode>(record.at("mode").get<std::string>(), static_cast<std::size_t>(Mode::docking) + 1);
-  result_.quads = record.at("quads").get<int>();
+  result_.quads = whole_number<int>(record, "quads");
   for (const Json& detection : record.at("detections")) result_.detections.push_back(detection_of(detection));
   if (record.contains("bundles")) {
     for (const Json& bundle : record.at("bundles")) result_.bundles.push_back(posed<BundlePose>(bundle));

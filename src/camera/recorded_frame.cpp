@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "berth/error.hpp"
+#include "camera/recorded_number.hpp"
 
 namespace berth {
 namespace {
@@ -19,7 +20,7 @@ Pose pose_of(const Json& json) {
 TruthMarker truth_marker(const Json& json) {
   TruthMarker marker;
   marker.family = json.at("family").get<std::string>();
-  marker.id = json.at("id").get<int>();
+  marker.id = whole_number<int>(json, "id");
   marker.size_m = json.at("size").get<double>();
   marker.visible = json.at("visible").get<double>();
   marker.corners = json.at("corners").get<std::array<std::array<double, 2>, 4>>();
@@ -45,8 +46,8 @@ CameraModel read_recorded_camera(const std::string& text, const std::string& nam
   try {
     const Json json = Json::parse(text);
     CameraModel camera;
-    camera.width = json.at("width").get<int>();
-    camera.height = json.at("height").get<int>();
+    camera.width = whole_number<int>(json, "width");
+    camera.height = whole_number<int>(json, "height");
     camera.fx = json.at("fx").get<double>();
     camera.fy = json.at("fy").get<double>();
     camera.cx = json.at("cx").get<double>();
@@ -54,10 +55,10 @@ CameraModel read_recorded_camera(const std::string& text, const std::string& nam
     if (json.at("lens").get<std::string>() == "equidistant") camera.lens = LensModel::equidistant;
     camera.distortion = json.at("distortion").get<std::array<double, 8>>();
     if (camera.width < 1 || camera.height < 1 || !(camera.fx > 0) || !(camera.fy > 0)) {
-      throw Error(name + ": the recorded camera is none: sides and focal lengths must be above 0; give --camera");
+      throw Error("sides and focal lengths must be above 0");
     }
     return camera;
-  } catch (const Json::exception& error) {
+  } catch (const std::exception& error) {
     throw Error(name + ": the recorded camera cannot be read (" + error.what() + "); give --camera");
   }
 }
@@ -67,13 +68,13 @@ RecordedFrame read_recorded_frame(const std::string& text, const std::string& na
     const Json json = Json::parse(text);
     RecordedFrame recorded;
     SourceFrame& frame = recorded.frame;
-    frame.stamp.sequence = json.at("frame").get<u64>();
-    frame.stamp.exposure_start_ns = json.at("exposure_start_ns").get<std::int64_t>();
-    frame.stamp.mid_exposure_ns = json.at("mid_exposure_ns").get<std::int64_t>();
-    frame.stamp.arrival_ns = json.at("arrival_ns").get<std::int64_t>();
+    frame.stamp.sequence = whole_number<u64>(json, "frame");
+    frame.stamp.exposure_start_ns = whole_number<std::int64_t>(json, "exposure_start_ns");
+    frame.stamp.mid_exposure_ns = whole_number<std::int64_t>(json, "mid_exposure_ns");
+    frame.stamp.arrival_ns = whole_number<std::int64_t>(json, "arrival_ns");
     recorded.clock = json.at("clock").get<std::string>();
     frame.label = json.at("label").get<std::string>();
-    if (json.contains("missed")) recorded.missed = json.at("missed").get<u64>();
+    if (json.contains("missed")) recorded.missed = whole_number<u64>(json, "missed");
     if (json.contains("truth")) {
       for (const Json& marker : json.at("truth")) frame.truth.push_back(truth_marker(marker));
     }
@@ -83,7 +84,7 @@ RecordedFrame read_recorded_frame(const std::string& text, const std::string& na
       }
     }
     return recorded;
-  } catch (const Json::exception& error) {
+  } catch (const std::exception& error) {
     throw Error(name + ": a frame's record cannot be read (" + error.what() + "); it is left out");
   }
 }
