@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -105,6 +107,25 @@ TEST(Scenario, TheSameSeedGivesTheSameFramesAndAnotherDoesNot) {
   EXPECT_NE(once, bytes(*open_scenario(written(other))));
 }
 
+// In finer points than pixels, and about the markers alone, where it tells.
+TEST(Scenario, ABlurInFinerPointsRoundsTheMarkersEdges) {
+  const std::string sensor = "frames = 1\n[sensor]\nread_noise = 0\nfull_well_e = 1e7\nblur_fineness = ";
+  const GrayImage plain = open_scenario(written(kSmall + sensor + "1\n"))->next()->image;
+  const GrayImage fine = open_scenario(written(kSmall + sensor + "4\n"))->next()->image;
+  int changed = 0, most = 0;
+  for (int y = 0; y < plain.height(); ++y) {
+    for (int x = 0; x < plain.width(); ++x) {
+      const int by = std::abs(plain.view().at(x, y) - fine.view().at(x, y));
+      changed += by > 0 ? 1 : 0;
+      most = std::max(most, by);
+    }
+  }
+  EXPECT_GT(changed, 20);
+  EXPECT_LT(changed, plain.width() * plain.height() / 4);
+  EXPECT_GT(most, 1);
+  EXPECT_LT(most, 30);
+}
+
 TEST(Scenario, RectangleGoesOnceAroundInOnePlane) {
   const auto source = open_scenario(
       written(std::string(kSmall) + "kind = \"rectangle\"\nframes = 5\nwidth_m = 0.4\nheight_m = 0.4\nrange_m = 1\n"));
@@ -145,6 +166,7 @@ TEST(Scenario, ErrorsNameFileLineFieldValueAndRemedy) {
       {"sede = 3\n", {".toml:1:", "'sede'", "unknown", "seed"}},
       {"seed = \"x\"\n", {"'seed'", "\"x\"", "whole number"}},
       {"[sensor]\ngamma = 0\n", {"'sensor.gamma'", "is 0", "from 0.1 to 5"}},
+      {"[sensor]\nblur_fineness = 9\n", {"'sensor.blur_fineness'", "is 9", "from 1 to 8"}},
       {"[sensor]\nread_noise = nan\n", {"'sensor.read_noise'", "nan", "from 0 to 60"}},
       {"[sensor]\nwhite_level = 5\nblack_level = 9\n", {"'sensor.white_level'", "is 5", "above black_level"}},
       {"[[marker]]\nfamily = \"tag36h12\"\n", {".toml:2:", "'marker[0].family'", "\"tag36h12\"", "tag36h11"}},

@@ -1,6 +1,7 @@
 #include "sim/scenario.hpp"
 
 #include <cstdint>
+#include <utility>
 
 #include "berth/error.hpp"
 #include "sim/board.hpp"
@@ -174,13 +175,13 @@ void read_target(TomlReader& reader, u64 seed, Scene& scene) {
 class ScenarioSource final : public Source {
  public:
   ScenarioSource(const std::string& path, Scene still, const Timing& timing, int frames,
-                 std::unique_ptr<Trajectory> trajectory)
+                 std::unique_ptr<Trajectory> trajectory, int fineness)
       : name_(path.substr(path.find_last_of('/') + 1)),
         still_(std::move(still)),
         timing_(timing),
         frames_(frames),
         trajectory_(std::move(trajectory)),
-        renderer_(still_.camera) {}
+        renderer_(still_.camera, fineness) {}
 
   std::optional<SourceFrame> next() override {
     if (next_ >= frames_) return std::nullopt;
@@ -243,7 +244,9 @@ std::unique_ptr<Source> open_scenario(const std::string& path) {
   scene.camera = read_camera(camera);
   const Timing timing = read_timing(camera);
   camera.finish();
-  read_sensor(reader.table("sensor"), scene.sensor);
+  TomlReader sensor = reader.table("sensor");
+  const int fineness = sensor.integer("blur_fineness", 1, 1, 8);
+  read_sensor(std::move(sensor), scene.sensor);
   read_lighting(reader.table("lighting"), scene.lighting);
   read_target(reader, scene.seed, scene);
 
@@ -252,7 +255,7 @@ std::unique_ptr<Source> open_scenario(const std::string& path) {
   std::unique_ptr<Trajectory> trajectory = read_trajectory(path_reader, frames);
   path_reader.finish();
   reader.finish();
-  return std::make_unique<ScenarioSource>(path, std::move(scene), timing, frames, std::move(trajectory));
+  return std::make_unique<ScenarioSource>(path, std::move(scene), timing, frames, std::move(trajectory), fineness);
 }
 
 }  // namespace berth
