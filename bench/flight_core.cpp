@@ -59,6 +59,7 @@ std::vector<Picture> pictures_that_hurt() {
           {"checkerboard, 2 px", pictures::checkerboard(kWidth, kHeight, 2)},
           {"checkerboard, 8 px", pictures::checkerboard(kWidth, kHeight, 8)},
           {"checkerboard, 10 px", pictures::checkerboard(kWidth, kHeight, 10)},
+          {"800 squares without a code", pictures::hollow_squares(kWidth, kHeight, 800)},
           {"mazes", pictures::mazes(kWidth, kHeight, 3)},
           {"2,000 quadrilaterals", pictures::quads(kWidth, kHeight, 2000, 4, 4)}};
 }

@@ -73,23 +73,6 @@ GrayImage marker_wall(int count) {
   return sim::Renderer(scene.camera).render(scene);
 }
 
-/// The first `count` of 32 x 25 cells hold a dark square with a light one in it: quadrilaterals without a code.
-GrayImage square_field(int count) {
-  constexpr int kWidth = 640, kHeight = 480, kCell = 19, kColumns = 32;
-  GrayImage image = pictures::uniform(kWidth, kHeight, 190);
-  for (int i = 0; i < count; ++i) {
-    const int left = i % kColumns * (kWidth / kColumns) + 3;
-    const int top = i / kColumns * kCell + 3;
-    for (int y = 0; y < 13; ++y) {
-      for (int x = 0; x < 13; ++x) {
-        const bool inside = x >= 4 && x < 9 && y >= 4 && y < 9;
-        image.view().row(top + y)[left + x] = inside ? 180 : 40;
-      }
-    }
-  }
-  return image;
-}
-
 std::vector<u8> all_levels() {
   std::vector<u8> levels;
   for (int level = 0; level < 256; ++level) levels.push_back(static_cast<u8>(level));
@@ -119,7 +102,7 @@ std::vector<Series> measure(const Options& options) {
   all.push_back(markers);
   Series clutter{"Clutter: 640×480, dark squares without a code", "squares", {}};
   for (const int count : {0, 100, 200, 400, 600, 800}) {
-    clutter.points.push_back(time(count, fmt::format("{} squares", count), square_field(count)));
+    clutter.points.push_back(time(count, fmt::format("{} squares", count), pictures::hollow_squares(640, 480, count)));
   }
   all.push_back(clutter);
   Series worst{"Worst cases, 640×480", "case", {}};
@@ -135,7 +118,7 @@ std::vector<Series> measure(const Options& options) {
       {"checkerboard of 10 px", pictures::checkerboard(640, 480, 10)},
       {"checkerboard of 16 px", pictures::checkerboard(640, 480, 16)},
       {"mazes", pictures::mazes(640, 480, 3)},
-      {"800 squares without a code", square_field(800)},
+      {"800 squares without a code", pictures::hollow_squares(640, 480, 800)},
   };
   for (const auto& [name, image] : cases) {
     worst.points.push_back(time(static_cast<double>(worst.points.size()), name, image));

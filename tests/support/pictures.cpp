@@ -32,6 +32,22 @@ GrayImage checkerboard(int width, int height, int cell) {
   return image;
 }
 
+GrayImage hollow_squares(int width, int height, int count) {
+  constexpr int kCellWidth = 20, kCellHeight = 19, kFrom = 3, kSide = 13, kHole = 4;
+  GrayImage image = uniform(width, height, 190);
+  const int columns = width / kCellWidth;
+  for (int i = 0; i < std::min(count, columns * (height / kCellHeight)); ++i) {
+    const int left = i % columns * kCellWidth + kFrom, top = i / columns * kCellHeight + kFrom;
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        const bool inside = std::min({x, y, kSide - 1 - x, kSide - 1 - y}) >= kHole;
+        image.view().at(left + x, top + y) = inside ? 180 : 40;
+      }
+    }
+  }
+  return image;
+}
+
 namespace {
 
 struct Corner {

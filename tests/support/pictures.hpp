@@ -26,6 +26,9 @@ GrayImage checkerboard(int width, int height, int cell);
 /// Dark convex quadrilaterals of random place, size and turn with light ones inside, on a light ground, with ±spread
 /// noise.
 GrayImage quads(int width, int height, int count, int spread, u64 seed);
+/// The first `count` cells of a grid of 20 × 19 px hold a dark square with a light one in it: each may be a marker
+/// until its last reading has failed. At most as many as the grid has cells.
+GrayImage hollow_squares(int width, int height, int count);
 /// Nested frames, combs and spirals: contours with notches, holes and long ways.
 GrayImage mazes(int width, int height, u64 seed);
 
