@@ -6,8 +6,9 @@
 
 int main(int argc, char** argv) try {
   const cv::Mat image = cv::imread(argc > 1 ? argv[1] : "dock.png", cv::IMREAD_GRAYSCALE);
+  if (image.empty()) return std::fprintf(stderr, "no image that can be read\n"), 2;
   berth::DetectorConfig config;                                 // looks for tag36h11 unless told otherwise
-  config.camera = berth::paper_camera(image.cols, image.rows);  // yours: berth::read_camera("camera.yaml")
+  config.camera = berth::paper_camera(image.cols, image.rows);  // 4:3 alone; yours: berth::read_camera("camera.yaml")
   config.marker_size_m = 0.1;
   const auto backend = berth::open_backend("simd");
   berth::Detector detector(*backend, image.cols, image.rows, config);

@@ -239,7 +239,8 @@ NB_MODULE(_berth, m) {
       .def_prop_ro("mid_exposure_ns", [](const SourceFrame& f) { return f.stamp.mid_exposure_ns; })
       .def_ro("truth", &SourceFrame::truth, "Empty unless it is simulated.");
   nb::class_<PythonSource>(m, "Source",
-                           "Frames: 'sim:FILE', 'dir:DIR', 'file:IMAGE', 'video:FILE', 'v4l2:CAMERA' or a path.")
+                           "Frames: 'sim:FILE', 'dir:DIR', 'file:IMAGE', 'video:FILE', 'mcap:FILE', 'v4l2:CAMERA', "
+                           "'aravis:CAMERA', 'gst:PIPELINE' or a path.")
       .def(nb::init<const std::string&>(), "name"_a, nb::call_guard<nb::gil_scoped_release>())
       .def(
           "__iter__", [](nb::handle self) { return self; }, nb::sig("def __iter__(self) -> Source"))

@@ -22,9 +22,9 @@ LEFT_OUT = {
     r"camera_to_ros\.py": "the test camera_to_ros runs it",
     r"FAKE_CUDA|--backend cuda|build/release/berth": "cuda_test and verify run what it shows",
     r"docs/recording\.md": "the test recording_commands_run runs the whole page",
-    r"^berth eval ": "needs a set of thousands of pictures; eval_test runs it on a small one",
-    r"^berth bench --explain --machine tx1": "bench_test runs it",
-    r"^berth verify$": "verify_test runs it, on every backend",
+    r"^berth eval ": "needs a set of thousands of pictures; cli_eval_test runs it on a small one",
+    r"^berth bench --explain --machine tx1": "cli_backends_test runs it",
+    r"^berth verify$": "CI's section verify runs it",
 }
 
 # In place of what is not here, or takes long: pattern, replacement.
@@ -90,7 +90,6 @@ def prepare(folder, root):
     for name in ["photo.png", "photo.jpg"]:
         shutil.copy(photo, folder / name)
     shutil.copy(root / "bundles/approach.yaml", folder / "dock.yaml")
-    shutil.copy(root / "models/lite.berthnet", folder)
     (folder / "token").write_text("0123456789abcdef\n")
     (folder / "berth.toml").touch()
     pose = {"translation": {"x": 0, "y": 0, "z": 0}, "rotation": {"quaternion": {"W": 1, "X": 0, "Y": 0, "Z": 0}}}
