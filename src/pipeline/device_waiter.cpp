@@ -1,6 +1,7 @@
 #include "pipeline/device_waiter.hpp"
 
 #include <chrono>
+#include <utility>
 
 #include "pipeline/thread_setup.hpp"
 
@@ -45,6 +46,33 @@ DeviceWaiter::End DeviceWaiter::finish(DeviceFrame& frame, std::int64_t most_ns)
   given_.notify_one();
   hangs_ = !ended_.wait_for(lock, std::chrono::nanoseconds(most_ns), [this] { return frame_ == nullptr; });
   return hangs_ ? End::hangs : is_alive_ ? End::done : End::lost;
+}
+
+DeviceWaiters::DeviceWaiters(std::size_t backends, std::int64_t most_ns, std::size_t most_returns) : most_ns_(most_ns) {
+  if (most_ns == 0) return;
+  all_.reserve(backends * (1 + most_returns));
+  for (std::size_t i = 0; i < backends; ++i) all_.push_back(make());
+  waiters_ = all_;
+}
+
+DeviceWaiters::~DeviceWaiters() {
+  for (const auto& waiter : all_) waiter->end();
+}
+
+DeviceWaiter::End DeviceWaiters::finish(std::size_t backend, DeviceFrame& frame) {
+  using End = DeviceWaiter::End;
+  if (waiters_.empty() || frame.stream().is_immediate()) return frame.finish() ? End::done : End::lost;
+  return waiters_[backend]->finish(frame, most_ns_);
+}
+
+std::shared_ptr<DeviceWaiter> DeviceWaiters::make() const {
+  return most_ns_ > 0 ? std::make_shared<DeviceWaiter>() : nullptr;
+}
+
+void DeviceWaiters::exchange(std::size_t backend, std::shared_ptr<DeviceWaiter>& waiter) {
+  if (waiters_.empty()) return;
+  std::swap(waiters_[backend], waiter);
+  all_.push_back(waiters_[backend]);
 }
 
 }  // namespace berth
