@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "berth/systematic_covariance.hpp"
 #include "engine.hpp"
@@ -12,6 +13,9 @@ namespace berth::cli {
 
 /// --size-deviation and --edge-deviation
 void add_deviation_options(CLI::App& command, EngineOptions& options);
+
+/// What systematic errors make of the poses of a frame's detections, in their order; none where there is no pose.
+using SystematicCovariances = std::vector<std::optional<std::array<double, 36>>>;
 
 /// What calibration, the markers' size and their edges may be off by, beside the noise of a frame: from the camera's
 /// file and the command line.
