@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "berth/types.hpp"
@@ -202,5 +203,24 @@ inline Channel channel_of(FieldReader& fields) {
   channel.metadata = fields.map();
   return channel;
 }
+
+/// The schemas and channels of a file, by their ids. Of several with one id the first holds: the format has them be the
+/// same.
+struct Definitions {
+  std::map<u16, Schema> schemas;
+  std::map<u16, Channel> channels;
+
+  /// Takes in what a record defines. False where it is damaged; true, and nothing, of other records.
+  bool take(Op op, FieldReader fields) {
+    if (op == Op::schema) {
+      Schema schema = schema_of(fields);
+      if (fields.ok()) schemas.emplace(schema.id, std::move(schema));
+    } else if (op == Op::channel) {
+      Channel channel = channel_of(fields);
+      if (fields.ok()) channels.emplace(channel.id, std::move(channel));
+    }
+    return fields.ok();
+  }
+};
 
 }  // namespace berth::mcap

@@ -73,16 +73,15 @@ bool IndexedFile::take_index() {
   // Channels stand before the indexes of chunks, in which their numbers are looked for.
   for (Record record; whole && next_record(left, record);) {
     FieldReader fields(record.content, record.size);
-    if (record.op == Op::channel) {
-      Channel channel = channel_of(fields);
-      if (fields.ok()) channels_.emplace(channel.id, std::move(channel));
-    } else if (record.op == Op::chunk_index) {
+    if (record.op == Op::chunk_index) {
       whole = take_chunk_index(fields, start);
+    } else {
+      definitions_.take(record.op, fields);
     }
   }
   if (whole && !chunks_.empty()) return true;
   chunks_.clear();
-  channels_.clear();
+  definitions_ = {};
   return false;
 }
 
@@ -105,8 +104,8 @@ bool IndexedFile::take_chunk_index(FieldReader& fields, u64 summary_start) {
   for (Record record; next_record(left, record);) {
     FieldReader entries(record.content, record.size);
     const u16 id = entries.number<u16>();
-    const auto channel = channels_.find(id);
-    if (record.op != Op::message_index || channel == channels_.end()) return false;
+    const auto channel = definitions_.channels.find(id);
+    if (record.op != Op::message_index || channel == definitions_.channels.end()) return false;
     if (!wanted_(channel->second.topic)) continue;
     std::vector<u64>& places = chunk.messages[id];
     if (entries.number<u32>() != entries.left() || entries.left() % 16 != 0) return false;
@@ -126,13 +125,9 @@ void IndexedFile::scan() {
   ChunkCodec codec;
   Bytes records;
   bool has_loose = false;
-  const auto take_channel = [this](FieldReader fields) {
-    Channel channel = channel_of(fields);
-    if (fields.ok()) channels_.emplace(channel.id, std::move(channel));
-  };
   while (scan.next(problems_)) {
     const Bytes& content = scan.content();
-    if (scan.op() == Op::channel) take_channel({content.data(), content.size()});
+    definitions_.take(scan.op(), {content.data(), content.size()});
     has_loose = has_loose || scan.op() == Op::message;
     if (scan.op() != Op::chunk) continue;
     Chunk chunk;
@@ -148,11 +143,12 @@ void IndexedFile::scan() {
     u64 at = 0;
     for (Record record; next_record(left, record); at = records.size() - left.left()) {
       FieldReader fields(record.content, record.size);
-      if (record.op == Op::channel) take_channel(fields);
+      definitions_.take(record.op, fields);
       if (record.op != Op::message) continue;
       const u16 id = fields.number<u16>();
-      const auto channel = channels_.find(id);
-      if (fields.ok() && channel != channels_.end() && wanted_(channel->second.topic)) found.messages[id].push_back(at);
+      const auto channel = definitions_.channels.find(id);
+      if (fields.ok() && channel != definitions_.channels.end() && wanted_(channel->second.topic))
+        found.messages[id].push_back(at);
     }
     chunks_.push_back(std::move(found));
   }

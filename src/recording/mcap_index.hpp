@@ -27,7 +27,7 @@ class IndexedFile {
   IndexedFile& operator=(const IndexedFile&) = delete;
 
   const std::vector<IndexedChunk>& chunks() const { return chunks_; }
-  const std::map<u16, Channel>& channels() const { return channels_; }
+  const std::map<u16, Channel>& channels() const { return definitions_.channels; }
   /// Whether the file's own index was used; if not, what follows says what is missing.
   bool by_index() const { return by_index_; }
   const Problems& problems() const { return problems_; }
@@ -59,7 +59,7 @@ class IndexedFile {
   };
   OpenFile file_;
   std::vector<IndexedChunk> chunks_;
-  std::map<u16, Channel> channels_;
+  Definitions definitions_;
   Problems problems_;
   bool by_index_ = false, complete_ = false;
   u64 index_end_ = 0;  // of the chunks whose index was read

@@ -18,10 +18,10 @@ const Named* find_named(const std::vector<Named>& all, const std::string& name) 
 Reader::Reader(const std::string& path) : scan_(path) { ahead_ = advance(); }
 
 const Schema* Reader::schema_of_channel(u16 channel) const {
-  const auto known = channels_.find(channel);
-  if (known == channels_.end()) return nullptr;
-  const auto schema = schemas_.find(known->second.schema);
-  return schema == schemas_.end() ? nullptr : &schema->second;
+  const auto known = definitions_.channels.find(channel);
+  if (known == definitions_.channels.end()) return nullptr;
+  const auto schema = definitions_.schemas.find(known->second.schema);
+  return schema == definitions_.schemas.end() ? nullptr : &schema->second;
 }
 
 const Metadata* Reader::find_metadata(const std::string& name) const { return find_named(metadata_, name); }
@@ -29,17 +29,8 @@ const Attachment* Reader::find_attachment(const std::string& name) const { retur
 
 void Reader::take_side_record() {
   const Bytes& content = scan_.content();
-  FieldReader fields(content.data(), content.size());
-  bool whole = true;
-  if (scan_.op() == Op::schema) {
-    Schema schema = schema_of(fields);
-    whole = fields.ok();
-    if (whole) schemas_.emplace(schema.id, std::move(schema));
-  } else if (scan_.op() == Op::channel) {
-    Channel channel = channel_of(fields);
-    whole = fields.ok();
-    if (whole) channels_.emplace(channel.id, std::move(channel));
-  } else if (scan_.op() == Op::metadata) {
+  bool whole = definitions_.take(scan_.op(), {content.data(), content.size()});
+  if (scan_.op() == Op::metadata) {
     whole = read_metadata(content, metadata_.emplace_back());
     if (!whole) metadata_.pop_back();
   } else if (scan_.op() == Op::attachment && content.size() <= kMostAttachment) {
@@ -88,12 +79,8 @@ const Message* Reader::next() {
       FieldReader fields(record.content, record.size);
       if (record.op == Op::message) {
         if (const Message* message = take_message(fields)) return message;
-      } else if (record.op == Op::schema) {
-        Schema schema = schema_of(fields);
-        if (fields.ok()) schemas_.emplace(schema.id, std::move(schema));
-      } else if (record.op == Op::channel) {
-        Channel channel = channel_of(fields);
-        if (fields.ok()) channels_.emplace(channel.id, std::move(channel));
+      } else {
+        definitions_.take(record.op, fields);
       }
     }
     if (at_ < records_.size()) problems_.add("the chunk at byte " + std::to_string(scan_.offset()) + " ends in damage");

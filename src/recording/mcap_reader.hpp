@@ -19,7 +19,7 @@ class Reader {
   const Message* next();
 
   /// Of what was read so far: channels and schemas by their ids, metadata, attachments (but those above 16 MiB).
-  const std::map<u16, Channel>& channels() const { return channels_; }
+  const std::map<u16, Channel>& channels() const { return definitions_.channels; }
   const Schema* schema_of_channel(u16 channel) const;
   const std::vector<Metadata>& metadata() const { return metadata_; }
   const Metadata* find_metadata(const std::string& name) const;
@@ -46,8 +46,7 @@ class Reader {
   bool ahead_ = false;  // advance() went on and nothing of it was given yet
   bool loose_ = false;  // the scan's record is a message
   Message message_;
-  std::map<u16, Channel> channels_;
-  std::map<u16, Schema> schemas_;
+  Definitions definitions_;
   std::vector<Metadata> metadata_;
   std::vector<Attachment> attachments_;
 };

@@ -100,12 +100,12 @@ void Writer::put_record(Op op, const Bytes& content) {
 
 void Writer::add(const Schema& schema) {
   put_record(Op::schema, content_of(schema));
-  schemas_[schema.id] = schema;
+  definitions_.schemas[schema.id] = schema;
 }
 
 void Writer::add(const Channel& channel) {
   put_record(Op::channel, content_of(channel));
-  channels_[channel.id] = channel;
+  definitions_.channels[channel.id] = channel;
 }
 
 void Writer::add(const Attachment& attachment, u64 log_time) {
@@ -168,12 +168,8 @@ Writer::ChunkIndex Writer::look_through(const Bytes& records, ChunkPlace& place)
       place.start_time = any ? std::min(place.start_time, time) : time;
       place.end_time = any ? std::max(place.end_time, time) : time;
       any = true;
-    } else if (record.op == Op::schema) {
-      Schema schema = schema_of(fields);
-      if (fields.ok()) schemas_.emplace(schema.id, std::move(schema));
-    } else if (record.op == Op::channel) {
-      Channel channel = channel_of(fields);
-      if (fields.ok()) channels_.emplace(channel.id, std::move(channel));
+    } else {
+      definitions_.take(record.op, fields);
     }
   }
   return index;
@@ -256,17 +252,17 @@ void Writer::add_summary_group(Op op, const std::vector<Bytes>& contents, Bytes&
 Bytes Writer::summary() const {
   Bytes summary, offsets;
   std::vector<Bytes> group;
-  for (const auto& [id, schema] : schemas_) group.push_back(content_of(schema));
+  for (const auto& [id, schema] : definitions_.schemas) group.push_back(content_of(schema));
   add_summary_group(Op::schema, group, summary, offsets);
   group.clear();
-  for (const auto& [id, channel] : channels_) group.push_back(content_of(channel));
+  for (const auto& [id, channel] : definitions_.channels) group.push_back(content_of(channel));
   add_summary_group(Op::channel, group, summary, offsets);
 
   Bytes statistics;
   FieldWriter counts(statistics);
   counts.number(messages_);
-  counts.number(static_cast<u16>(schemas_.size()));
-  counts.number(static_cast<u32>(channels_.size()));
+  counts.number(static_cast<u16>(definitions_.schemas.size()));
+  counts.number(static_cast<u32>(definitions_.channels.size()));
   counts.number(static_cast<u32>(attachments_.size()));
   counts.number(static_cast<u32>(metadata_.size()));
   counts.number(static_cast<u32>(chunks_.size()));

@@ -81,8 +81,7 @@ class Writer {
   u32 whole_crc_ = 0;
   ChunkCodec codec_;
   Bytes records_, compressed_, content_;  // of the open chunk; the same as it is written; of a record being made
-  std::map<u16, Schema> schemas_;
-  std::map<u16, Channel> channels_;
+  Definitions definitions_;
   std::map<u16, u64> message_counts_;
   std::vector<ChunkPlace> chunks_;
   std::vector<SidePlace> attachments_, metadata_;

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <set>
 #include <system_error>
 
 #include "berth/error.hpp"
@@ -69,14 +68,14 @@ class Walk {
   bool take_schema(FieldReader& fields) {
     const Schema schema = schema_of(fields);
     if (!fields.ok()) return false;
-    if (schemas_.insert(schema.id).second && to_ != nullptr && !in_summary_) to_->add(schema);
+    if (definitions_.schemas.emplace(schema.id, schema).second && to_ != nullptr && !in_summary_) to_->add(schema);
     return true;
   }
 
   bool take_channel(FieldReader& fields) {
     const Channel channel = channel_of(fields);
     if (!fields.ok()) return false;
-    if (topics_.emplace(channel.id, channel.topic).second && to_ != nullptr && !in_summary_) to_->add(channel);
+    if (definitions_.channels.emplace(channel.id, channel).second && to_ != nullptr && !in_summary_) to_->add(channel);
     return true;
   }
 
@@ -103,15 +102,11 @@ class Walk {
     FieldReader left(records_.data(), records_.size());
     for (Record record; next_record(left, record);) {
       FieldReader fields(record.content, record.size);
-      if (record.op == Op::channel) {
-        const Channel channel = channel_of(fields);
-        if (fields.ok()) topics_.emplace(channel.id, channel.topic);
-      } else if (record.op == Op::schema) {
-        const Schema schema = schema_of(fields);
-        if (fields.ok()) schemas_.insert(schema.id);
-      } else if (record.op == Op::message) {
+      if (record.op == Op::message) {
         const u16 channel = fields.number<u16>();
         if (fields.ok()) count(channel);
+      } else {
+        definitions_.take(record.op, fields);
       }
     }
     if (to_ != nullptr) to_->copy_chunk(chunk.compression, chunk.data, chunk.size, records_);
@@ -119,8 +114,9 @@ class Walk {
 
   void count(u16 channel) {
     ++found_.messages;
-    const auto topic = topics_.find(channel);
-    ++found_.messages_by_topic[topic == topics_.end() ? "channel " + std::to_string(channel) : topic->second];
+    const auto known = definitions_.channels.find(channel);
+    ++found_.messages_by_topic[known == definitions_.channels.end() ? "channel " + std::to_string(channel)
+                                                                    : known->second.topic];
   }
 
   RecordScan scan_;
@@ -128,8 +124,7 @@ class Walk {
   Writer* to_ = nullptr;
   Recovery found_;
   Bytes records_;
-  std::set<u16> schemas_;
-  std::map<u16, std::string> topics_;
+  Definitions definitions_;
   bool in_summary_ = false;
 };
 
