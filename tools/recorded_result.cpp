@@ -6,6 +6,7 @@
 
 #include "berth/error.hpp"
 #include "camera/recorded_number.hpp"
+#include "camera/recorded_pose.hpp"
 
 namespace berth::cli {
 namespace {
@@ -24,13 +25,6 @@ Enum named(const std::string& name, std::size_t count) {
 
 std::int64_t ns_of_us(const Json& us) { return static_cast<std::int64_t>(std::llround(us.get<double>() * 1e3)); }
 
-Pose pose_of(const Json& json) {
-  Pose pose;
-  pose.R = json.at("R").get<std::array<double, 9>>();
-  pose.t = json.at("t").get<std::array<double, 3>>();
-  return pose;
-}
-
 PoseUncertainty uncertainty_of(const Json& json) {
   PoseUncertainty uncertainty;
   uncertainty.covariance = json.at("covariance").get<std::array<double, 36>>();
@@ -38,7 +32,7 @@ PoseUncertainty uncertainty_of(const Json& json) {
   const double ambiguity = json.at("ambiguity").get<double>();
   if (!json.contains("other")) return uncertainty;
   uncertainty.has_other = true;
-  uncertainty.other = pose_of(json.at("other"));
+  uncertainty.other = recorded_pose(json.at("other"));
   uncertainty.other_error_px = json.at("other").at("error_px").get<double>();
   // Not recorded: any two that have this ratio.
   uncertainty.chi_square = ambiguity * ambiguity;
@@ -56,7 +50,7 @@ Detection detection_of(const Json& json) {
   detection.center = json.at("center").get<std::array<double, 2>>();
   if (!json.contains("pose")) return detection;
   detection.has_pose = true;
-  detection.pose = pose_of(json.at("pose"));
+  detection.pose = recorded_pose(json.at("pose"));
   if (json.at("pose").contains("covariance")) detection.pose_uncertainty = uncertainty_of(json.at("pose"));
   return detection;
 }
@@ -68,7 +62,7 @@ Posed posed(const Json& json) {
   one.used = whole_number<int>(json, "used");
   one.has_pose = json.contains("pose");
   if (!one.has_pose) return one;
-  one.pose = pose_of(json.at("pose"));
+  one.pose = recorded_pose(json.at("pose"));
   one.uncertainty = uncertainty_of(json.at("pose"));
   return one;
 }
@@ -90,7 +84,7 @@ TruthMarker truth_marker(const Json& json) {
   marker.family = json.at("family").get<std::string>();
   marker.id = whole_number<int>(json, "id");
   marker.size_m = json.at("size").get<double>();
-  marker.pose = pose_of(json.at("pose"));
+  marker.pose = recorded_pose(json.at("pose"));
   return marker;
 }
 

@@ -4,18 +4,12 @@
 
 #include "berth/error.hpp"
 #include "camera/recorded_number.hpp"
+#include "camera/recorded_pose.hpp"
 
 namespace berth {
 namespace {
 
 using Json = nlohmann::json;
-
-Pose pose_of(const Json& json) {
-  Pose pose;
-  pose.R = json.at("R").get<std::array<double, 9>>();
-  pose.t = json.at("t").get<std::array<double, 3>>();
-  return pose;
-}
 
 TruthMarker truth_marker(const Json& json) {
   TruthMarker marker;
@@ -24,7 +18,7 @@ TruthMarker truth_marker(const Json& json) {
   marker.size_m = json.at("size").get<double>();
   marker.visible = json.at("visible").get<double>();
   marker.corners = json.at("corners").get<std::array<std::array<double, 2>, 4>>();
-  marker.pose = pose_of(json.at("pose"));
+  marker.pose = recorded_pose(json.at("pose"));
   return marker;
 }
 
@@ -80,7 +74,7 @@ RecordedFrame read_recorded_frame(const std::string& text, const std::string& na
     }
     if (json.contains("truth_targets")) {
       for (const Json& target : json.at("truth_targets")) {
-        frame.truth_targets.push_back({target.at("name").get<std::string>(), pose_of(target.at("pose"))});
+        frame.truth_targets.push_back({target.at("name").get<std::string>(), recorded_pose(target.at("pose"))});
       }
     }
     return recorded;
