@@ -102,11 +102,7 @@ std::vector<std::string> aravis_formats() {
 }
 
 std::unique_ptr<CameraSource> open_aravis(const AravisOptions& options) {
-  LiveOptions live;
-  live.name = "aravis:" + options.name;
-  live.buffers = options.buffers;
-  live.watchdog_ms = options.watchdog_ms;
-  live.repeats = options.repeats;
+  LiveOptions live = live_options("aravis:" + options.name, options);
   live.closes_aside = true;
   return open_live(live, aravis_opener(options));
 }

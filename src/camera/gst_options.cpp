@@ -68,11 +68,7 @@ std::vector<std::string> gst_formats() {
 }
 
 std::unique_ptr<CameraSource> open_gst(const GstOptions& options) {
-  LiveOptions live;
-  live.name = name_of(options);
-  live.buffers = options.buffers;
-  live.watchdog_ms = options.watchdog_ms;
-  live.repeats = options.repeats;
+  LiveOptions live = live_options(name_of(options), options);
   live.closes_aside = true;
   return open_live(live, gst_opener(options));
 }

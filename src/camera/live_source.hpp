@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "berth/source.hpp"
 #include "camera/live_camera.hpp"
@@ -15,5 +16,16 @@ namespace berth {
 /// at most every 0.5 s; frames go on when it is back. The first attempt that fails is complained of, and then what
 /// fails every 3 s, which is how long next() waits. Throws Error when it cannot be opened the first time.
 std::unique_ptr<CameraSource> open_live(const LiveOptions& options, LiveCameraOpener opener);
+
+/// What every kind of camera's options say of it as a source.
+template <class CameraOptions>
+LiveOptions live_options(const std::string& name, const CameraOptions& options) {
+  LiveOptions live;
+  live.name = name;
+  live.buffers = options.buffers;
+  live.watchdog_ms = options.watchdog_ms;
+  live.repeats = options.repeats;
+  return live;
+}
 
 }  // namespace berth
