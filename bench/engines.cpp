@@ -3,7 +3,6 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
-#include <opencv2/aruco.hpp>
 #include <optional>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include "berth/backend.hpp"
 #include "berth/detector.hpp"
 #include "berth/error.hpp"
+#include "target/opencv_aruco.hpp"
 
 namespace berth::bench {
 namespace {
@@ -95,16 +95,11 @@ class ApriltagEngine final : public Engine {
 
 class ArucoEngine final : public Engine {
  public:
-  ArucoEngine()
-      : dictionary_(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11)),
-        parameters_(cv::aruco::DetectorParameters::create()) {
-    parameters_->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  ArucoEngine() : detector_(aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11), refining()) {
     cv::setNumThreads(1);
   }
   const std::string& name() const override { return name_; }
-  void run(View2D<const u8> image) override {
-    cv::aruco::detectMarkers(as_mat(image), dictionary_, corners_, ids_, parameters_);
-  }
+  void run(View2D<const u8> image) override { detector_.detectMarkers(as_mat(image), corners_, ids_); }
   std::vector<Found> found() const override {
     std::vector<Found> all;
     for (std::size_t i = 0; i < ids_.size(); ++i) {
@@ -120,9 +115,14 @@ class ArucoEngine final : public Engine {
   }
 
  private:
+  static aruco::DetectorParameters refining() {
+    aruco::DetectorParameters parameters;
+    parameters.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+    return parameters;
+  }
+
   std::string name_ = "aruco";
-  cv::Ptr<cv::aruco::Dictionary> dictionary_;
-  cv::Ptr<cv::aruco::DetectorParameters> parameters_;
+  aruco::ArucoDetector detector_;
   std::vector<std::vector<cv::Point2f>> corners_;
   std::vector<int> ids_;
 };

@@ -1,4 +1,4 @@
-# Marker family tables, made at build time from libapriltag and OpenCV's aruco module (docs/families.md).
+# Marker family tables, made at build time from libapriltag and OpenCV's ArUco (docs/families.md).
 #
 # berth_family_tables(OUT): sets OUT to the path of the generated include file. BERTH_FAMILIES_INC names one that was
 # generated before: for cross builds without an emulator, whose programs cannot run while building, and for builds without
@@ -22,13 +22,15 @@ function(berth_family_tables out)
 
   find_path(APRILTAG_INCLUDE_DIR apriltag/apriltag.h)
   find_library(APRILTAG_LIBRARY apriltag)
-  find_package(OpenCV QUIET COMPONENTS core aruco)
+  include(BerthAruco)
+  find_package(OpenCV QUIET COMPONENTS core ${BERTH_ARUCO_MODULE})
   if(NOT APRILTAG_INCLUDE_DIR OR NOT APRILTAG_LIBRARY OR NOT OpenCV_FOUND)
-    message(FATAL_ERROR "The marker family tables need libapriltag and OpenCV's aruco module at build time: "
-                        "apt install libapriltag-dev libopencv-contrib-dev, or pass -DBERTH_FAMILIES_INC=FILE")
+    message(FATAL_ERROR "The marker family tables need libapriltag and OpenCV's ArUco at build time: "
+                        "apt install libapriltag-dev libopencv-dev, or pass -DBERTH_FAMILIES_INC=FILE")
   endif()
   add_executable(generate_families generate_families.cpp)
-  target_link_libraries(generate_families PRIVATE berth_options ${APRILTAG_LIBRARY} opencv_core opencv_aruco)
+  target_link_libraries(generate_families PRIVATE berth_options ${APRILTAG_LIBRARY} opencv_core
+                                                  opencv_${BERTH_ARUCO_MODULE})
   target_include_directories(generate_families SYSTEM PRIVATE ${APRILTAG_INCLUDE_DIR} ${OpenCV_INCLUDE_DIRS})
   set(inc ${CMAKE_CURRENT_BINARY_DIR}/families.inc)
   add_custom_command(OUTPUT ${inc} COMMAND generate_families ${inc} DEPENDS generate_families

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 
 #include "berth/detector.hpp"
@@ -18,6 +17,7 @@
 #include "support/command_run.hpp"
 #include "support/marker_scene.hpp"
 #include "support/scratch_folder.hpp"
+#include "target/opencv_aruco.hpp"
 
 namespace berth {
 namespace {
@@ -284,11 +284,10 @@ TEST(BoardFinder, FindsOpenCvsCharuco) {
   Board board = small_board(BoardKind::charuco);
   board.columns = 6;
   board.rows = 5;
-  const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50);
-  const auto drawn = cv::aruco::CharucoBoard::create(6, 5, static_cast<float>(board.pitch_m),
-                                                     static_cast<float>(board.marker_m), dictionary);
+  const aruco::CharucoBoard drawn({6, 5}, static_cast<float>(board.pitch_m), static_cast<float>(board.marker_m),
+                                  aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50));
   cv::Mat picture;
-  drawn->draw({640, 540}, picture, 20);  // 100 px a square, the first one's edge at 19.5
+  drawn.generateImage({640, 540}, picture, 20);  // 100 px a square, the first one's edge at 19.5
   const auto backend = open_backend("simd");
   BoardFinder finder(board, *backend, 640, 540);
   const auto view = finder.find({picture.data, 640, 540, 640});

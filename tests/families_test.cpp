@@ -14,12 +14,12 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <opencv2/aruco.hpp>
 #include <string>
 
 #include "berth/error.hpp"
 #include "berth/marker.hpp"
 #include "target/marker_pattern.hpp"
+#include "target/opencv_aruco.hpp"
 
 namespace berth {
 namespace {
@@ -98,12 +98,12 @@ TEST(Families, PatternsAreOpenCvs) {
   for (const std::string& name : family_names()) {
     if (name.compare(0, 5, "aruco") != 0) continue;
     const MarkerFamily& ours = family(name);
-    const cv::Ptr<cv::aruco::Dictionary> theirs = cv::aruco::getPredefinedDictionary(dictionary++);
-    ASSERT_EQ(static_cast<int>(ours.codes.size()), theirs->bytesList.rows) << name;
-    ASSERT_EQ(ours.border_width, theirs->markerSize + 2) << name;
+    const aruco::Dictionary theirs = aruco::getPredefinedDictionary(dictionary++);
+    ASSERT_EQ(static_cast<int>(ours.codes.size()), theirs.bytesList.rows) << name;
+    ASSERT_EQ(ours.border_width, theirs.markerSize + 2) << name;
     for (const int id : sample_ids(ours)) {
       cv::Mat image;
-      cv::aruco::drawMarker(theirs, id, ours.border_width, image, 1);
+      aruco::generateImageMarker(theirs, id, ours.border_width, image);
       const std::vector<u8> pattern = marker_pattern(ours, id);
       for (int y = 0; y < ours.border_width; ++y) {
         for (int x = 0; x < ours.border_width; ++x) {

@@ -1,5 +1,5 @@
 // Writes the tables of every built-in marker family as C++ (families.cpp includes the result). A tool of the build: it
-// links libapriltag and OpenCV's aruco module so that nobody retypes a code and nothing of Berth needs them later.
+// links libapriltag and OpenCV's ArUco so that nobody retypes a code and nothing of Berth needs them later.
 
 #include <apriltag/apriltag.h>
 #include <apriltag/tag16h5.h>
@@ -17,9 +17,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
-#include <opencv2/aruco.hpp>
 #include <string>
 #include <vector>
+
+#include "opencv_aruco.hpp"
 
 namespace {
 
@@ -112,8 +113,8 @@ Family from_apriltag(const apriltag_family_t* source) {
 }
 
 Family from_aruco(const std::string& name, int dictionary_name) {
-  const cv::Ptr<cv::aruco::Dictionary> dictionary = cv::aruco::getPredefinedDictionary(dictionary_name);
-  const int side = dictionary->markerSize;
+  const berth::aruco::Dictionary dictionary = berth::aruco::getPredefinedDictionary(dictionary_name);
+  const int side = dictionary.markerSize;
   Family family;
   family.name = name;
   family.border_width = side + 2;
@@ -124,8 +125,8 @@ Family from_aruco(const std::string& name, int dictionary_name) {
       family.bit_y.push_back(y + 1);
     }
   }
-  for (int id = 0; id < dictionary->bytesList.rows; ++id) {
-    const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(dictionary->bytesList.rowRange(id, id + 1), side);
+  for (int id = 0; id < dictionary.bytesList.rows; ++id) {
+    const cv::Mat bits = berth::aruco::Dictionary::getBitsFromByteList(dictionary.bytesList.rowRange(id, id + 1), side);
     std::uint64_t code = 0;
     for (int y = 0; y < side; ++y) {
       for (int x = 0; x < side; ++x) code = code << 1 | (bits.at<unsigned char>(y, x) != 0 ? 1 : 0);
