@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "berth/types.hpp"
@@ -32,7 +33,7 @@ struct MarkerFamily {
 /// Names of every built-in family: AprilTag 3's, then OpenCV's ArUco dictionaries ("aruco4x4_50", …).
 const std::vector<std::string>& family_names();
 /// The family of that name. Throws Error that lists near names otherwise.
-const MarkerFamily& family(const std::string& name);
+const MarkerFamily& family(std::string_view name);
 
 /// A pose of the marker in the camera frame: a marker point X is at R·X + t (metres).
 struct Pose {

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <new>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "berth/ops.hpp"
@@ -42,7 +43,7 @@ void make_tables() {
 }
 
 /// Nothing but the family itself takes the tables' memory: neither its name nor what is said of one that is unknown.
-const MarkerFamily& family_in_tables(const std::string& name) {
+const MarkerFamily& family_in_tables(std::string_view name) {
   const std::vector<std::string>& names = family_names();
   if (std::find(names.begin(), names.end(), name) == names.end()) return family(name);  // throws
   const std::lock_guard<std::mutex> lock(tables_mutex);

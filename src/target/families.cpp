@@ -1,6 +1,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "berth/error.hpp"
@@ -57,7 +58,7 @@ const std::vector<std::string>& family_names() {
   return names;
 }
 
-const MarkerFamily& family(const std::string& name) {
+const MarkerFamily& family(std::string_view name) {
   // Immutable once made, and made only when asked for: the large families are half a megabyte each.
   static std::mutex mutex;
   static std::unique_ptr<const MarkerFamily> families[kFamilyCount];
@@ -67,8 +68,9 @@ const MarkerFamily& family(const std::string& name) {
     if (!families[i]) families[i] = make_family(kFamilyTables[i]);
     return *families[i];
   }
-  throw Error("unknown marker family \"" + name + "\"; near names: " + near_names(name, family_names(), 3) + " (of " +
-              std::to_string(kFamilyCount) + " families)");
+  const std::string unknown(name);
+  throw Error("unknown marker family \"" + unknown + "\"; near names: " + near_names(unknown, family_names(), 3) +
+              " (of " + std::to_string(kFamilyCount) + " families)");
 }
 
 }  // namespace berth

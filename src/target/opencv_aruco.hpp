@@ -1,5 +1,6 @@
-// OpenCV's ArUco by its calls of 4.7 and later, where it lies in objdetect. For earlier versions (Debian 12, Ubuntu 22.04
-// and 24.04), as many of these calls as Berth makes, over contrib's module aruco; cmake/BerthAruco.cmake links which it is.
+// OpenCV's ArUco by its calls of 4.7 and later, where it lies in objdetect. For earlier versions (Debian 12,
+// Ubuntu 22.04 and 24.04), as many of these calls as Berth makes, over contrib's module aruco; cmake/BerthAruco.cmake
+// links which it is.
 #pragma once
 
 #include <opencv2/core.hpp>

@@ -10,6 +10,7 @@ enum : signed char { kDark = 0, kLight = 1, kOpen = 2 };
 using Modules = std::array<std::array<signed char, PatternCells::kMost>, PatternCells::kMost>;
 
 void draw_ring(Modules& modules, int first, int last, signed char tone) {
+  last = std::min(last, PatternCells::kMost - 1);  // it is: for GCC 14, which does not know how wide families are
   for (int i = first; i <= last; ++i) {
     const std::size_t at = static_cast<std::size_t>(i);
     const std::size_t a = static_cast<std::size_t>(first), b = static_cast<std::size_t>(last);
