@@ -9,8 +9,7 @@
 
 #include "berth/detector.hpp"
 #include "frame_queue.hpp"
-#include "recording/mcap_writer.hpp"
-#include "ros2/cdr.hpp"
+#include "message_file.hpp"
 #include "ros_dock.hpp"
 
 namespace berth::cli {
@@ -49,37 +48,25 @@ class RecordingFile {
 
   /// Written; after cut_back, those that stayed.
   std::uint64_t frames() const { return frames_; }
-  u64 bytes() const { return writer_.bytes(); }
+  u64 bytes() const { return file_.bytes(); }
   /// How many messages of each topic were dropped, none left out that has any.
   std::map<std::string, std::uint64_t> dropped_by_topic(std::uint64_t pictures, std::uint64_t frames) const;
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  void end_chunk();
-  mcap::u16 add_topic(const std::string& topic, const std::string& type, const std::string& schema);
-  void send(mcap::u16 topic);
-  std::int64_t stamp_of(const QueuedFrame& frame);
   void write_picture(View2D<const u8> image, std::int64_t stamp_ns);
   void write_poses(const FrameResult& result, std::int64_t stamp_ns);
   void write_health(const QueuedFrame& frame, std::uint64_t dropped_pictures, std::uint64_t dropped_frames);
 
-  mcap::Writer writer_;
+  MessageFile file_;
   RecordPictures pictures_;
   DetectorConfig config_;
   std::string backend_;
   std::optional<RosDock> dock_;
-  ros2::CdrWriter cdr_;
   std::vector<u8> png_;
-  std::vector<std::string> topics_;
   mcap::u16 image_ = 0, camera_ = 0, detections_ = 0, transforms_ = 0, pose_ = 0, frame_ = 0, health_ = 0, record_ = 0;
-  std::vector<u32> sequences_;
-  u64 log_time_ = 0, stamp_time_ = 0;  // of the messages being written
-  std::int64_t start_wall_ns_ = 0, start_monotonic_ns_ = 0;
-  bool has_first_ = false;
-  std::int64_t first_ns_ = 0;  // the first frame's time, on a clock that is not the monotonic one
   Clock::time_point next_health_;
-  Clock::time_point chunk_began_, synced_;
   std::uint64_t frames_ = 0, whole_frames_ = 0;
 };
 
