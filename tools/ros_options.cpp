@@ -32,6 +32,7 @@ constexpr std::array<Known, kRosTopics> kKnown = {{
     {"diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "diagnostics", false, 10},
 }};
 constexpr int kMostDomain = 232, kMostDepth = 100'000;
+constexpr const char* kGroup = "With --ros";
 
 [[noreturn]] void refuse(const std::string& option, const std::string& value, const std::string& problem,
                          const std::string& remedy) {
@@ -63,37 +64,35 @@ std::string checked_name(const std::string& option, const std::string& value, st
   return name;
 }
 
-std::string checked_frame(const char* option, const std::string& frame) {
-  if (frame.empty() || frame.front() == '/' || frame.find_first_of(" \t\n") != std::string::npos) {
-    refuse(option, "\"" + frame + "\"", "no name of a frame", "give one without spaces and without / in front");
-  }
-  return frame;
-}
-
-std::string names() {
+std::string names(const std::vector<RosTopic>& offered) {
   std::string all;
-  for (const Known& known : kKnown) all += (all.empty() ? "" : ", ") + std::string(known.name);
+  for (const RosTopic topic : offered) all += (all.empty() ? "" : ", ") + std::string(name_of(topic));
   return all;
 }
 
-// NAME=VALUE; the value, and which topic is named.
-std::string value_for(const char* option, const std::string& text, std::size_t& topic) {
+// NAME=VALUE; the value, and which of the topics offered is named.
+std::string value_for(const char* option, const std::string& text, const std::vector<RosTopic>& offered,
+                      std::size_t& topic) {
   const std::size_t at = text.find('=');
   const std::string name = text.substr(0, at);
-  const auto known = std::find_if(kKnown.begin(), kKnown.end(), [&](const Known& k) { return name == k.name; });
-  if (at == std::string::npos || known == kKnown.end()) {
-    refuse(option, text, "\"" + name + "\" is none of the topics", "give NAME=… with one of " + names());
+  const auto found = std::find_if(offered.begin(), offered.end(), [&](RosTopic one) { return name == name_of(one); });
+  if (at == std::string::npos || found == offered.end()) {
+    refuse(option, text, "\"" + name + "\" is none of the topics", "give NAME=… with one of " + names(offered));
   }
-  topic = static_cast<std::size_t>(known - kKnown.begin());
+  topic = static_cast<std::size_t>(*found);
   return text.substr(at + 1);
 }
 
 void set_topics(const RosOptions& options, RosPlan& plan) {
   std::array<std::string, kRosTopics> topics;
-  for (std::size_t i = 0; i < kRosTopics; ++i) topics[i] = kKnown[i].topic;
+  topics.fill("off");
+  for (const RosTopic topic : options.offered) {
+    const auto i = static_cast<std::size_t>(topic);
+    topics[i] = kKnown[i].topic;
+  }
   for (const std::string& text : options.topics) {
     std::size_t i = 0;
-    const std::string name = value_for("--ros-topic", text, i);
+    const std::string name = value_for("--ros-topic", text, options.offered, i);
     if (name != "off") checked_name("--ros-topic", text, name);
     topics[i] = name;
   }
@@ -109,6 +108,8 @@ void set_topics(const RosOptions& options, RosPlan& plan) {
     topic.name = topics[i].front() == '/' ? topics[i].substr(1) : space + topics[i];
   }
   if (options.images.empty()) plan.topics[static_cast<std::size_t>(RosTopic::image)].name.clear();
+  // Without a mount there is nothing that stands still.
+  if (options.mount.empty()) plan.topics[static_cast<std::size_t>(RosTopic::tf_static)].name.clear();
 }
 
 void set_policy(const std::string& text, const std::string& policy, RosTopicPlan& topic) {
@@ -151,61 +152,74 @@ int domain_of(const RosOptions& options) {
   return static_cast<int>(domain);
 }
 
+void with_ros(CLI::Option* option, CLI::Option* ros, const char* type) {
+  option->type_name(type)->needs(ros)->group(kGroup);
+}
+
 }  // namespace
 
 const char* name_of(RosTopic topic) { return kKnown[static_cast<std::size_t>(topic)].name; }
 const char* type_of(RosTopic topic) { return kKnown[static_cast<std::size_t>(topic)].type; }
 
-void add_ros_options(CLI::App& command, RosOptions& options) {
-  CLI::Option* ros = command.add_flag("--ros", options.on,
-                                      "publish to ROS 2 nodes, without ROS: poses, tf, detections, camera, diagnostics "
-                                      "(docs/ros2.md)");
-  const auto with_ros = [&](CLI::Option* option, const char* type) {
-    option->type_name(type)->needs(ros)->group("With --ros");
-  };
+std::string checked_frame(const char* option, const std::string& frame) {
+  if (frame.empty() || frame.front() == '/' || frame.find_first_of(" \t\n") != std::string::npos) {
+    refuse(option, "\"" + frame + "\"", "no name of a frame", "give one without spaces and without / in front");
+  }
+  return frame;
+}
+
+CLI::Option* add_ros_network_options(CLI::App& command, RosOptions& options, const std::string& what) {
+  CLI::Option* ros =
+      command.add_flag("--ros", options.on, "publish to ROS 2 nodes, without ROS: " + what + " (docs/ros2.md)");
   with_ros(command.add_option("--ros-domain", options.domain, "domain [ROS_DOMAIN_ID, or 0]")
                ->check(CLI::Range(0, kMostDomain)),
-           "N");
-  with_ros(command.add_option("--ros-namespace", options.name_space, "put before every topic's name"), "NAME");
+           ros, "N");
+  with_ros(command.add_option("--ros-namespace", options.name_space, "put before every topic's name"), ros, "NAME");
   with_ros(command
                .add_option("--ros-topic", options.topics,
-                           "another name for one of " + names() +
+                           "another name for one of " + names(options.offered) +
                                "; or off. May be repeated; /NAME stays outside the "
                                "namespace")
                ->allow_extra_args(false),
-           "NAME=TOPIC");
+           ros, "NAME=TOPIC");
   with_ros(command
                .add_option("--ros-qos", options.qos,
                            "reliable or best_effort, volatile or transient_local, messages kept; may be repeated")
                ->allow_extra_args(false),
-           "NAME=POLICY,…");
-  with_ros(command.add_option("--ros-frame", options.camera_frame, "what the camera's frame is called")
-               ->capture_default_str(),
-           "NAME");
-  with_ros(command.add_option("--ros-frame-prefix", options.frame_prefix, "put before every frame's name"), "TEXT");
-  with_ros(command.add_option("--ros-dock", options.dock,
-                              "whose pose is published: a bundle, a target or FAMILY:ID [the first that has one]"),
-           "NAME");
-  with_ros(command.add_option("--ros-mount", options.mount,
-                              "where the camera sits, for tf_static: parent's frame, m and degrees; x forward, y left, "
-                              "z up"),
-           "PARENT,X,Y,Z,ROLL,PITCH,YAW");
-  with_ros(
-      command.add_option("--ros-images", options.images, "publish images, too")->check(CLI::IsMember({"jpeg", "png"})),
-      "jpeg|png");
-  with_ros(command.add_option("--ros-image-rate", options.image_rate, "most images a second")
-               ->check(CLI::Range(0.01, 1000.0))
-               ->capture_default_str(),
-           "HZ");
+           ros, "NAME=POLICY,…");
+  with_ros(command.add_option("--ros-frame-prefix", options.frame_prefix, "put before every frame's name"), ros,
+           "TEXT");
   command.add_flag("--ros-source-time", options.source_time, "stamps are the frames' own times, whatever their clock")
       ->needs(ros)
-      ->group("With --ros");
+      ->group(kGroup);
   with_ros(command
                .add_option("--ros-wait", options.wait_s,
                            "before the first frame, wait so long at most for every topic that is not transient_local "
                            "to have a reader")
                ->check(CLI::Range(0.0, 3600.0)),
-           "SECONDS");
+           ros, "SECONDS");
+  return ros;
+}
+
+void add_ros_options(CLI::App& command, RosOptions& options) {
+  CLI::Option* ros = add_ros_network_options(command, options, "poses, tf, detections, camera, diagnostics");
+  with_ros(command.add_option("--ros-frame", options.camera_frame, "what the camera's frame is called")
+               ->capture_default_str(),
+           ros, "NAME");
+  with_ros(command.add_option("--ros-dock", options.dock,
+                              "whose pose is published: a bundle, a target or FAMILY:ID [the first that has one]"),
+           ros, "NAME");
+  with_ros(command.add_option("--ros-mount", options.mount,
+                              "where the camera sits, for tf_static: parent's frame, m and degrees; x forward, y left, "
+                              "z up"),
+           ros, "PARENT,X,Y,Z,ROLL,PITCH,YAW");
+  with_ros(
+      command.add_option("--ros-images", options.images, "publish images, too")->check(CLI::IsMember({"jpeg", "png"})),
+      ros, "jpeg|png");
+  with_ros(command.add_option("--ros-image-rate", options.image_rate, "most images a second")
+               ->check(CLI::Range(0.01, 1000.0))
+               ->capture_default_str(),
+           ros, "HZ");
 }
 
 RosPlan make_ros_plan(const RosOptions& options) {
@@ -214,7 +228,7 @@ RosPlan make_ros_plan(const RosOptions& options) {
   set_topics(options, plan);
   for (const std::string& text : options.qos) {
     std::size_t i = 0;
-    const std::vector<std::string> policies = split(value_for("--ros-qos", text, i), ',');
+    const std::vector<std::string> policies = split(value_for("--ros-qos", text, options.offered, i), ',');
     if (policies.empty()) set_policy(text, "", plan.topics[i]);
     for (const std::string& policy : policies) set_policy(text, policy, plan.topics[i]);
   }
@@ -230,11 +244,17 @@ RosPlan make_ros_plan(const RosOptions& options) {
 }
 
 #if !BERTH_WITH_ROS2
-std::shared_ptr<FrameObserver> make_ros_publisher(const RosPlan&) {
+namespace {
+
+[[noreturn]] void refuse_ros() {
   throw Error(
       "--ros: this berth was built without Cyclone DDS; install cyclonedds-dev (0.10) and build again with "
       "-DBERTH_WITH_ROS2=ON");
 }
+
+}  // namespace
+
+std::shared_ptr<FrameObserver> make_ros_publisher(const RosPlan&) { refuse_ros(); }
 #endif
 
 }  // namespace berth::cli

@@ -18,6 +18,9 @@ constexpr std::size_t kRosTopics = 8;
 /// As typed.
 struct RosOptions {
   bool on = false;
+  /// What there is to publish; the caller's.
+  std::vector<RosTopic> offered = {RosTopic::pose,       RosTopic::dock_pose,   RosTopic::tf,    RosTopic::tf_static,
+                                   RosTopic::detections, RosTopic::camera_info, RosTopic::image, RosTopic::diagnostics};
   /// Below 0: ROS_DOMAIN_ID, or 0 without it.
   int domain = -1;
   std::string name_space;
@@ -68,7 +71,12 @@ struct RosPlan {
 const char* name_of(RosTopic topic);
 const char* type_of(RosTopic topic);
 
-/// --ros and what goes with it
+/// A name of a frame, or an Error that names the option.
+std::string checked_frame(const char* option, const std::string& frame);
+
+/// --ros, which is returned, and what goes with it whatever is published; `what` that is, in short.
+CLI::Option* add_ros_network_options(CLI::App& command, RosOptions& options, const std::string& what);
+/// The same and what goes with a camera's frames.
 void add_ros_options(CLI::App& command, RosOptions& options);
 
 /// Throws Error that names the option, its value and the remedy.

@@ -3,13 +3,8 @@
 #include <fmt/format.h>
 #include <time.h>
 
-#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
-#include <thread>
-
-#include "berth/error.hpp"
-#include "monotonic.hpp"
 
 namespace berth::cli {
 namespace {
@@ -19,44 +14,31 @@ constexpr std::size_t kFrameSlots = 256;
 constexpr std::size_t kImageSlots = 2;
 constexpr std::chrono::milliseconds kReportEvery(1000);
 constexpr int kJpegQuality = 80;
-constexpr std::array kTopics = {RosTopic::pose,       RosTopic::dock_pose,   RosTopic::tf,    RosTopic::tf_static,
-                                RosTopic::detections, RosTopic::camera_info, RosTopic::image, RosTopic::diagnostics};
-static_assert(kTopics.size() == kRosTopics);
 
-std::int64_t read_clock(clockid_t clock) {
+std::int64_t thread_cpu_ns() {
   timespec now = {};
-  clock_gettime(clock, &now);
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
-
-std::int64_t unix_ns() { return read_clock(CLOCK_REALTIME); }
 
 // Adds the calling thread's processor time between its making and its end.
 class CpuTimer {
  public:
   explicit CpuTimer(std::int64_t& sum_ns) : sum_ns_(sum_ns) {}
-  ~CpuTimer() { sum_ns_ += read_clock(CLOCK_THREAD_CPUTIME_ID) - start_; }
+  ~CpuTimer() { sum_ns_ += thread_cpu_ns() - start_; }
   CpuTimer(const CpuTimer&) = delete;
   CpuTimer& operator=(const CpuTimer&) = delete;
 
  private:
   std::int64_t& sum_ns_;
-  std::int64_t start_ = read_clock(CLOCK_THREAD_CPUTIME_ID);
+  std::int64_t start_ = thread_cpu_ns();
 };
 
 }  // namespace
 
 std::shared_ptr<FrameObserver> make_ros_publisher(const RosPlan& plan) { return std::make_shared<RosPublisher>(plan); }
 
-RosPublisher::RosPublisher(RosPlan plan) : plan_(std::move(plan)), participant_(plan_.domain) {
-  for (const RosTopic topic : kTopics) {
-    const RosTopicPlan& wanted = plan_.topic(topic);
-    // Without a mount there is nothing that stands still.
-    if (wanted.name.empty() || (topic == RosTopic::tf_static && plan_.parent.empty())) continue;
-    writers_[static_cast<std::size_t>(topic)] = std::make_unique<ros2::TopicWriter>(
-        participant_, wanted.name, type_of(topic), ros2::Qos{wanted.reliable, wanted.latched, wanted.depth});
-  }
-}
+RosPublisher::RosPublisher(RosPlan plan) : plan_(std::move(plan)), writers_(plan_) {}
 
 void RosPublisher::begin(const ObservedStream& stream) {
   dock_ = std::make_unique<RosDock>(plan_.dock, stream.config);
@@ -67,9 +49,9 @@ void RosPublisher::begin(const ObservedStream& stream) {
   }
   if (!plan_.parent.empty()) {
     add_transform({unix_ns(), plan_.parent}, plan_.camera_frame, plan_.mount);
-    send(RosTopic::tf_static, transforms_, results_);
+    writers_.send(RosTopic::tf_static, transforms_, results_);
   }
-  wait_for_readers();
+  writers_.wait_for_readers();
   reported_ = std::chrono::steady_clock::now();
   worker_ = std::make_unique<BoundedWorker<Item>>(
       "berth-ros", kFrameSlots, [this](Item& item) { publish(item); }, kReportEvery, [this] { publish_health(); });
@@ -78,26 +60,9 @@ void RosPublisher::begin(const ObservedStream& stream) {
                                                              [this](ImageItem& item) { publish_image(item); });
 }
 
-void RosPublisher::wait_for_readers() const {
-  // What is kept for later readers need not wait for them.
-  const auto read = [&](RosTopic topic) {
-    const auto& writer = writers_[static_cast<std::size_t>(topic)];
-    return !writer || plan_.topic(topic).latched || writer->readers() > 0;
-  };
-  const auto all_read = [&] { return std::all_of(kTopics.begin(), kTopics.end(), read); };
-  const std::int64_t until = monotonic_ns() + static_cast<std::int64_t>(plan_.wait_s * 1e9);
-  while (monotonic_ns() < until && !all_read()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-}
-
-std::int64_t RosPublisher::stamp_of(const FrameStamp& stamp) const {
-  if (plan_.source_time) return stamp.mid_exposure_ns;
-  // Other clocks say nothing of when that was.
-  if (std::string_view(stamp.clock) != "monotonic") return unix_ns();
-  return stamp.mid_exposure_ns + (unix_ns() - monotonic_ns());
-}
-
 void RosPublisher::observe(const ObservedFrame& frame) {
-  const std::int64_t stamp_ns = stamp_of(frame.result.stamp);
+  const FrameStamp& stamp = frame.result.stamp;
+  const std::int64_t stamp_ns = ros_stamp_ns(plan_, stamp.clock, stamp.mid_exposure_ns);
   const bool taken = worker_->offer([&](Item& item) {
     item.stamp_ns = stamp_ns;
     item.latency_ns = frame.paced != nullptr ? frame.paced->laps_ns[static_cast<std::size_t>(Lap::latency)] : -1;
@@ -124,27 +89,15 @@ void RosPublisher::offer_image(const ObservedFrame& frame, std::int64_t stamp_ns
   });
 }
 
-template <class Message>
-void RosPublisher::send(RosTopic topic, const Message& message, Sender& sender) {
-  const auto i = static_cast<std::size_t>(topic);
-  if (!writers_[i]) return;
-  write(message, sender.cdr);
-  if (writers_[i]->send(sender.cdr)) {
-    ++sent_[i];
-  } else {
-    ++sender.unsent;
-  }
-}
-
 void RosPublisher::publish(const Item& item) {
-  const CpuTimer timer(results_.cpu_ns);
+  const CpuTimer timer(cpu_ns_);
   const ros2::Header header = {item.stamp_ns, plan_.camera_frame};
   const FrameResult& result = item.result;
   health_->add(result, item.engine, item.latency_ns);
   const RosDock::Seen dock = dock_->in(result);
-  if (dock.pose != nullptr) send(RosTopic::dock_pose, ros2::PoseStamped{header, *dock.pose}, results_);
+  if (dock.pose != nullptr) writers_.send(RosTopic::dock_pose, ros2::PoseStamped{header, *dock.pose}, results_);
   if (dock.covariance != nullptr) {
-    send(RosTopic::pose, ros2::PoseWithCovarianceStamped{header, *dock.pose, *dock.covariance}, results_);
+    writers_.send(RosTopic::pose, ros2::PoseWithCovarianceStamped{header, *dock.pose, *dock.covariance}, results_);
   }
   transforms_.transforms.clear();
   for (const Detection& d : result.detections) {
@@ -156,9 +109,9 @@ void RosPublisher::publish(const Item& item) {
   for (std::size_t i = 0; i < result.disc_targets.size(); ++i) {
     if (result.disc_targets[i].has_pose) add_transform(header, target_frames_[i], result.disc_targets[i].pose);
   }
-  if (!transforms_.transforms.empty()) send(RosTopic::tf, transforms_, results_);
-  send(RosTopic::detections, ros2::AprilTagDetectionArray{header, result.detections}, results_);
-  if (item.camera) send(RosTopic::camera_info, ros2::CameraInfo{header, *item.camera}, results_);
+  if (!transforms_.transforms.empty()) writers_.send(RosTopic::tf, transforms_, results_);
+  writers_.send(RosTopic::detections, ros2::AprilTagDetectionArray{header, result.detections}, results_);
+  if (item.camera) writers_.send(RosTopic::camera_info, ros2::CameraInfo{header, *item.camera}, results_);
 }
 
 void RosPublisher::add_transform(const ros2::Header& header, std::string_view child, const Pose& pose) {
@@ -173,22 +126,12 @@ std::string_view RosPublisher::frame_of(const MarkerFamily& family, int id) {
 }
 
 void RosPublisher::publish_image(const ImageItem& item) {
-  const CpuTimer timer(images_.cpu_ns);
   const cv::Mat image(item.height, item.width, CV_8UC1, const_cast<u8*>(item.pixels.data()));
   std::vector<u8> file;
   cv::imencode(plan_.images == "png" ? ".png" : ".jpg", image, file,
                plan_.images == "png" ? std::vector<int>{} : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
-  send(RosTopic::image, ros2::CompressedImage{{item.stamp_ns, plan_.camera_frame}, plan_.images, file}, images_);
-}
-
-std::string RosPublisher::refused() const {
-  std::string all;
-  for (const RosTopic topic : kTopics) {
-    const auto& writer = writers_[static_cast<std::size_t>(topic)];
-    const std::string policy = writer ? writer->refused() : "";
-    if (!policy.empty()) all += (all.empty() ? "" : ", ") + fmt::format("{} ({})", name_of(topic), policy);
-  }
-  return all;
+  writers_.send(RosTopic::image, ros2::CompressedImage{{item.stamp_ns, plan_.camera_frame}, plan_.images, file},
+                images_);
 }
 
 void RosPublisher::publish_health() {
@@ -198,8 +141,8 @@ void RosPublisher::publish_health() {
   RosHealth::Beside beside;
   beside.unpublished = unpublished_;
   beside.unsent = results_.unsent;
-  beside.refused = refused();
-  send(RosTopic::diagnostics, health_->report(unix_ns(), seconds, beside), results_);
+  beside.refused = writers_.refused();
+  writers_.send(RosTopic::diagnostics, health_->report(unix_ns(), seconds, beside), results_);
 }
 
 void RosPublisher::finish(std::ostream& people) {
@@ -207,35 +150,14 @@ void RosPublisher::finish(std::ostream& people) {
   worker_->finish();
   if (image_worker_) image_worker_->finish();
   publish_health();
-  constexpr std::int64_t kWaitNs = 1'000'000'000;
-  const std::int64_t until = monotonic_ns() + kWaitNs;
-  bool all_have_it = true;
-  for (const auto& writer : writers_) {
-    if (writer)
-      all_have_it = writer->wait_for_readers(std::max<std::int64_t>(until - monotonic_ns(), 0)) && all_have_it;
-  }
   const std::uint64_t frames = worker_->taken();
-  people << fmt::format("ROS 2       {} frames published in domain {}, {} dropped", frames, plan_.domain,
-                        unpublished_.load());
+  std::string head =
+      fmt::format("{} frames published in domain {}, {} dropped", frames, plan_.domain, unpublished_.load());
   if (frames > 0) {
-    people << fmt::format("; {:.3f} ms of processor time each",
-                          static_cast<double>(results_.cpu_ns) / 1e6 / static_cast<double>(frames));
+    head += fmt::format("; {:.3f} ms of processor time each",
+                        static_cast<double>(cpu_ns_) / 1e6 / static_cast<double>(frames));
   }
-  people << '\n';
-  for (const RosTopic topic : kTopics) {
-    const auto i = static_cast<std::size_t>(topic);
-    if (!writers_[i]) continue;
-    people << fmt::format("  /{:<32} {:>8} sent, {} reader{} at the end\n", plan_.topics[i].name, sent_[i].load(),
-                          writers_[i]->readers(), writers_[i]->readers() == 1 ? "" : "s");
-  }
-  if (const std::string asked = refused(); !asked.empty()) {
-    people << "  readers asked for what is not offered: " << asked << "; see --ros-qos\n";
-  }
-  if (results_.unsent + images_.unsent > 0) {
-    people << fmt::format("  {} messages could not be sent: readers acknowledge too slowly\n",
-                          results_.unsent + images_.unsent);
-  }
-  if (!all_have_it) people << "  readers had not acknowledged everything 1 s after the end\n";
+  writers_.sum_up(people, head, results_.unsent + images_.unsent);
 }
 
 }  // namespace berth::cli

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <map>
@@ -13,11 +12,11 @@
 #include "berth/detector.hpp"
 #include "bounded_worker.hpp"
 #include "frame_observer.hpp"
-#include "ros2/dds.hpp"
 #include "ros2/messages.hpp"
 #include "ros_dock.hpp"
 #include "ros_health.hpp"
 #include "ros_options.hpp"
+#include "ros_writers.hpp"
 
 namespace berth::cli {
 
@@ -44,17 +43,7 @@ class RosPublisher final : public FrameObserver {
     int width = 0, height = 0;
     std::vector<u8> pixels;
   };
-  /// Of one thread: what it counts and writes with.
-  struct Sender {
-    ros2::CdrWriter cdr;
-    std::uint64_t unsent = 0;
-    std::int64_t cpu_ns = 0;
-  };
-
-  std::int64_t stamp_of(const FrameStamp& stamp) const;
   void offer_image(const ObservedFrame& frame, std::int64_t stamp_ns);
-  void wait_for_readers() const;
-  std::string refused() const;
   std::string_view frame_of(const MarkerFamily& family, int id);
   void add_transform(const ros2::Header& header, std::string_view child, const Pose& pose);
 
@@ -62,14 +51,9 @@ class RosPublisher final : public FrameObserver {
   void publish(const Item& item);
   void publish_image(const ImageItem& item);
   void publish_health();
-  template <class Message>
-  void send(RosTopic topic, const Message& message, Sender& sender);
 
   RosPlan plan_;
-  ros2::Participant participant_;
-  /// By RosTopic; null for those that are off.
-  std::array<std::unique_ptr<ros2::TopicWriter>, kRosTopics> writers_;
-  std::array<std::atomic<std::uint64_t>, kRosTopics> sent_ = {};
+  RosWriters writers_;
   /// Frames that found the queue full.
   std::atomic<std::uint64_t> unpublished_ = 0;
   std::unique_ptr<RosDock> dock_;
@@ -80,7 +64,8 @@ class RosPublisher final : public FrameObserver {
   /// Names of frames: of bundles, then of targets; and of the markers seen so far.
   std::vector<std::string> bundle_frames_, target_frames_;
   std::map<std::pair<const MarkerFamily*, int>, std::string> marker_frames_;
-  Sender results_, images_;
+  RosSender results_, images_;
+  std::int64_t cpu_ns_ = 0;  // of the thread that sends results
   std::unique_ptr<BoundedWorker<Item>> worker_;
   std::unique_ptr<BoundedWorker<ImageItem>> image_worker_;
 };
