@@ -149,6 +149,18 @@ std::string refusal(StationPairing& pairing, StationSide side, const char* clock
   return "";
 }
 
+// A recording's own names of clocks end with it, while its last frames still wait.
+TEST(StationPairing, KeepsTheClocksName) {
+  StationPairing pairing({});
+  std::string name = "ptp";
+  pairing.push(kRobot, at(10 * kMs, name.c_str()), nullptr);
+  pairing.end(kDock);
+  name = "xyz";
+  StationMoment moment;
+  ASSERT_TRUE(pairing.next(moment));
+  EXPECT_STREQ(moment.frames[0].stamp.clock, "ptp");
+}
+
 TEST(StationPairing, RefusesClocksThatAreNotOne) {
   StationPairing pairing({});
   EXPECT_THAT(refusal(pairing, kRobot, "none"), HasSubstr("station robot: its frames have no times"));

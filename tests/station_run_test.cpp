@@ -1,16 +1,21 @@
 // berth stations: two simulated cameras that see one flight from both its ends, whose truth is known.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
+#include "moment_health.hpp"
 #include "mount.hpp"
 #include "pose_algebra.hpp"
+#include "recording/cdr_reader.hpp"
+#include "recording/mcap_reader.hpp"
 #include "support/command_run.hpp"
 #include "support/noisy_corners.hpp"
 
@@ -161,6 +166,130 @@ TEST(StationRun, TakesEachStationAtItsOwnPace) {
   EXPECT_EQ(dock, frames_in(dock_log));
 }
 
+/// What `record` at the top wrote down of its moments.
+std::vector<json> moments_of(const std::string& path) {
+  std::vector<json> moments;
+  mcap::Reader reader(path);
+  while (const mcap::Message* message = reader.next()) {
+    if (reader.channels().at(message->channel).topic != "/berth/moment") continue;
+    CdrReader fields(message->data, message->size);
+    moments.push_back(json::parse(fields.string()));
+  }
+  return moments;
+}
+
+/// Records both stations and what they come to.
+File recorded_in(const ScratchFolder& folder) {
+  const auto record = [&](const char* name) { return "record = \"" + (folder / name) + "\"\n"; };
+  return {record("both.mcap"), record("robot.mcap"), record("dock.mcap"), 5, 5};
+}
+
+TEST(StationRun, ReplaysToTheSameBits) {
+  const ScratchFolder folder;
+  const File file = recorded_in(folder);
+  const CommandRun run = run_stations(folder, file, {"--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("both.mcap: 5 moments"));
+  ASSERT_EQ(run.lines().size(), 5u);
+  EXPECT_EQ(moments_of(folder / "both.mcap"), run.lines());
+  EXPECT_EQ(run.lines()[4].at("by"), "both");
+  // On another backend and in other threads, from the recordings alone.
+  File again = file;
+  again.robot += "backend = \"cpu\"\nthreads = 2\n";
+  const CommandRun replay = run_stations(folder, again, {"--json", "-", "--replay"});
+  EXPECT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_EQ(replay.out, run.out);
+  EXPECT_THAT(replay.err, HasSubstr("both   replay      5 moments, each equal to the recording bit for bit"));
+  EXPECT_THAT(replay.err, HasSubstr("robot  replay      5 frames, each equal to the recording bit for bit"));
+  EXPECT_THAT(run_berth({"replay", folder / "both.mcap"}).err, HasSubstr("berth stations FILE --replay"));
+}
+
+TEST(StationRun, AReplayNamesTheFirstMomentThatDiffers) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run_stations(folder, recorded_in(folder)).exit_code, 0);
+  // A mount in another place, by a bit.
+  const std::string text = text_of(folder / "stations.toml");
+  std::string moved = text;
+  moved.replace(moved.find("0,0.12,0,0,0,0"), 14, "0,0.12000000000000001,0,0,0,0");
+  const CommandRun replay = run_berth({"stations", folder.write("moved.toml", moved), "--replay"});
+  EXPECT_EQ(replay.exit_code, 1) << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr("5 of 5 moments differ; the first: robot 0, dock 0 at "));
+  EXPECT_THAT(replay.out, HasSubstr(" ns: pose."));
+  // One station's recording is of fewer frames.
+  ASSERT_EQ(run_berth({"run", "--source", "mcap:" + (folder / "dock.mcap"), "--max-frames", "3", "--size", "0.08",
+                       "--corners", "photometric", "--record", folder / "short.mcap"})
+                .exit_code,
+            0);
+  std::string lacking = text;
+  lacking.replace(lacking.find("dock.mcap"), 9, "short.mcap");
+  const CommandRun less = run_berth({"stations", folder.write("lacking.toml", lacking), "--replay"});
+  EXPECT_EQ(less.exit_code, 1) << less.err;
+  EXPECT_THAT(less.out, HasSubstr("replay      3 moments, each equal"));
+  EXPECT_THAT(less.out, HasSubstr("4 are of other frames than any there"));
+}
+
+// RLIMIT_FSIZE fails as a full disk does.
+TEST(StationRun, AFullDiskEndsTheRecordingAndNotTheRun) {
+  const ScratchFolder folder;
+  rlimit usual = {};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &usual), 0);
+  rlimit small = usual;
+  small.rlim_cur = 10'000;  // in the moments, wherever chunks end
+  const auto before = std::signal(SIGXFSZ, SIG_IGN);
+  const File file = {"record = \"" + (folder / "both.mcap") + "\"\n", "", "", 12, 12};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const CommandRun run = run_stations(folder, file, {"--json", "-"});
+  setrlimit(RLIMIT_FSIZE, &usual);
+  std::signal(SIGXFSZ, before);
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.lines().size(), 12u);
+  EXPECT_THAT(run.err, HasSubstr("both.mcap: writing the recording failed (File too large)"));
+  // What is whole stays, as much as it is; with what is said to be lost it is every moment.
+  const std::size_t kept = moments_of(folder / "both.mcap").size();
+  ASSERT_LT(kept, 12u);
+  EXPECT_THAT(run.err, HasSubstr("both.mcap: " + std::to_string(kept) + " moment"));
+  EXPECT_THAT(run.err, HasSubstr("; dropped " + std::to_string(12 - kept)));
+}
+
+TEST(MomentHealth, SaysWhetherTheStationsAgree) {
+  cli::MomentHealth health(28);
+  EXPECT_EQ(health.report().level, ros2::Level::stale);
+  StationMoment moment;
+  moment.came = {true, true};
+  moment.difference_ns = -2'000'000;
+  FusedPose fused;
+  fused.used = {true, true};
+  fused.has_pose = true;
+  fused.robot.views = 2;
+  fused.robot.disagreement = 7;
+  health.add(moment, fused, {StationCounts{3, 1, 0, 2, 0}, StationCounts{3, 0, 0, 0, 0}});
+  EXPECT_EQ(health.report().level, ros2::Level::ok);
+  fused.robot.disagreement = 30;
+  fused.disagree = true;
+  health.add(moment, fused, {});
+  fused.robot.disagreement = 8;
+  fused.disagree = false;
+  health.add(moment, fused, {});
+  health.add(moment, fused, {});
+  const ros2::DiagnosticStatus& some = health.report();
+  EXPECT_EQ(some.level, ros2::Level::warn);
+  EXPECT_EQ(some.message, "the stations disagree in 1 of 3 moments");
+  std::string values;
+  for (std::size_t i = 0; i < 10; ++i) values.append(some.values[i].key).append("=" + some.values[i].value + " ");
+  EXPECT_EQ(values,
+            "moments=4 by_both=4 by_robot=0 by_dock=0 without_pose=0 disagreed=1 disagreement=8.000 "
+            "largest_disagreement=30.000 gate=28 largest_difference_ms=2.000 ");
+  fused.robot.views = 1;
+  fused.used = {false, true};
+  health.add(moment, fused, {});
+  EXPECT_EQ(health.report().message,
+            "0 of 1 moments by both, 0 by the robot's camera alone, 1 by the dock's, 0 without "
+            "a pose");
+  fused.disagree = true;
+  health.add(moment, fused, {});
+  EXPECT_EQ(health.report().level, ros2::Level::error);
+}
+
 struct Refused {
   File file;
   std::string says;
@@ -175,6 +304,11 @@ TEST(StationRun, RefusesWhatMakesNoPair) {
       {{"", "pose = \"paper\"\n", ""}, "[robot] key 'pose' is 'paper'"},
       {{"", "", "family = \"tag25h9\"\n"}, "[dock] key 'marker' is 'tag36h11:9'; key 'family' leaves its family out"},
       {{"", "", "json = \"-\"\n"}, "[dock] key 'json' is '-'"},
+      {{"replay = true\n", "", ""}, "key 'record' at the top is missing"},
+      {{"record = \"" + (folder / "a.mcap") + "\"\n", "record = \"" + (folder / "a.mcap") + "\"\n", ""},
+       "[robot] key 'record' is '" + (folder / "a.mcap") + "'; the moments of both are recorded there"},
+      {{"dock-frame = \"the dock\"\n", "", ""}, "--dock-frame \"the dock\": no name of a frame"},
+      {{"ros = true\nros-topic = \"image=x\"\n", "", ""}, "give NAME=… with one of pose, detected_dock_pose, tf"},
   };
   for (const Refused& one : all) {
     const CommandRun run = run_stations(folder, one.file);

@@ -9,13 +9,10 @@
 #include "berth/error.hpp"
 #include "camera/sources.hpp"
 #include "commands.hpp"
-#include "recorder.hpp"
 #include "recording_setup.hpp"
-#include "ros_options.hpp"
+#include "run_options.hpp"
 #include "service_notify.hpp"
-#include "stream.hpp"
 #include "systematic_show.hpp"
-#include "web_options.hpp"
 
 namespace berth::cli {
 namespace {
@@ -78,15 +75,8 @@ bool is_same_file(const std::string& source, const std::string& file) {
 }  // namespace
 
 void add_run(CLI::App& app, Console& console, int& exit_code, const RunPart& part) {
-  struct Options {
-    std::string source, config;
-    StreamOptions stream;
-    RecordOptions record;
-    RosOptions ros;
-    WebOptions web;
-  };
   CLI::App* command = app.add_subcommand("run", "Find markers in a stream: simulation, folder, image, video or camera");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RunOptions>();
   command
       ->add_option("--source", options->source,
                    "sim:FILE (scenario), dir:DIR, file:IMAGE, video:FILE, mcap:FILE (a recording), v4l2:CAMERA, "
@@ -207,7 +197,7 @@ void add_run(CLI::App& app, Console& console, int& exit_code, const RunPart& par
     if (!options->record.file.empty() && is_same_file(options->source, options->record.file)) {
       throw Error(options->record.file + ": it is the source itself; record in another file");
     }
-    if (part) part(options->stream);
+    if (part) part(*options);
     if (options->ros.on) options->stream.observers.push_back(make_ros_publisher(make_ros_plan(options->ros)));
     const std::unique_ptr<Source> source = open_source(options->source);
     options->web.source = options->source;

@@ -17,11 +17,17 @@
 #include "frame_json.hpp"
 #include "interrupt.hpp"
 #include "line_prefix.hpp"
-#include "live_view.hpp"
+#include "moment_check.hpp"
+#include "moment_lines.hpp"
+#include "moment_publisher.hpp"
+#include "moment_record.hpp"
+#include "moment_recorder.hpp"
 #include "mount.hpp"
+#include "recording_setup.hpp"
+#include "replay_check.hpp"
 #include "run_config.hpp"
+#include "run_options.hpp"
 #include "station_run.hpp"
-#include "stream.hpp"
 
 namespace berth::cli {
 namespace {
@@ -30,6 +36,8 @@ constexpr const char* kExamples = R"(Examples:
   berth stations scenarios/stations.toml
   berth stations scenarios/stations.toml --json poses.jsonl
   berth stations cameras.toml --largest-difference-ms 2 --json - | jq .pose.t
+  berth stations cameras.toml --record both.mcap --ros      the pose of both recorded, and to ROS 2 nodes
+  berth stations cameras.toml --record both.mcap --replay   again from the recordings, to the same bits
 
 FILE has the options below without their dashes, then [robot] and [dock], each with the keys of berth run
 --config and marker, camera-at and marker-at (docs/stations.md). Ctrl-C ends both stations cleanly.)";
@@ -37,14 +45,25 @@ constexpr const char* kHelp = "docs/stations.md";
 const std::vector<std::string> kSections = {"robot", "dock"};
 
 struct Options {
-  std::string file, log;
+  std::string file, log, record;
+  bool replay = false;
+  std::string robot_frame = "base_link", dock_frame = "dock";
   double largest_difference_ms = 1;
   double wait_ms = 100;
   double gate = 28;
+  RosOptions ros;
+
+  Options() { ros.offered = {RosTopic::pose, RosTopic::dock_pose, RosTopic::tf, RosTopic::diagnostics}; }
 };
 
 void add_options(CLI::App& command, Options& options) {
   command.add_option("--json", options.log, "log: one JSON line a moment; - for standard output")->type_name("FILE");
+  command
+      .add_option("--record", options.record,
+                  "record the pose of both and what --json says in an MCAP file (docs/recording.md)")
+      ->type_name("FILE");
+  command.add_flag("--replay", options.replay,
+                   "the stations' frames and options from their own recordings, compared with these and with --record");
   command
       .add_option("--largest-difference-ms", options.largest_difference_ms,
                   "mid-exposures further apart are not of one moment; at most half of the shorter period")
@@ -61,6 +80,11 @@ void add_options(CLI::App& command, Options& options) {
       ->type_name("X")
       ->check(CLI::Range(0.0, 1e9))
       ->capture_default_str();
+  command.add_option("--robot-frame", options.robot_frame, "what the robot's frame is called, recorded and published")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_option("--dock-frame", options.dock_frame, "and the dock's")->type_name("NAME")->capture_default_str();
+  add_ros_network_options(command, options.ros, "the pose of both, tf, diagnostics");
 }
 
 /// One station: a `berth run` of its own, whose frames also go to the other's.
@@ -69,6 +93,7 @@ class StationCommand {
   StationCommand(StationSide side, const Options& options, Console& console, std::ostream& people, std::mutex& mutex,
                  StationRun& run)
       : side_(side),
+        options_(options),
         run_(run),
         out_text_(fmt::format("{:<6} ", name_of(side)), people, mutex),
         err_text_("", console.err(), mutex),
@@ -77,7 +102,7 @@ class StationCommand {
         console_(out_, err_, false),
         app_("", "berth") {
     app_.require_subcommand(1);
-    add_run(app_, console_, exit_code_, [this](StreamOptions& stream) { join(stream); });
+    add_run(app_, console_, exit_code_, [this](RunOptions& asked) { join(asked); });
     CLI::App& command = *app_.get_subcommand("run");
     command.add_option("--marker", marker_)->required();
     command.add_option("--camera-at", camera_at_)->required();
@@ -106,7 +131,10 @@ class StationCommand {
     if (thread_.joinable()) thread_.join();
   }
   bool complained() const { return console_.complained(); }
-  int exit_code() const { return exit_code_; }
+  int exit_code() const {
+    const bool is_replay_off = check_ && (check_->differing() > 0 || check_->not_compared() > 0);
+    return is_replay_off ? kNoResult : exit_code_;
+  }
 
  private:
   void complain(const std::string& what) { console_.complain(fmt::format("[{}] {}", name_of(side_), what)); }
@@ -121,7 +149,27 @@ class StationCommand {
     return *mount;
   }
 
-  void join(StreamOptions& stream) {
+  /// The station's frames as they were recorded, with the options of then, compared with what they came to.
+  void replay(RunOptions& run) {
+    const std::string file = run.record.file;
+    if (file.empty()) throw Error("key 'record' is missing; --replay takes the station's frames from that recording");
+    const EngineOptions given = run.stream.engine;
+    run = RunOptions();
+    run.source = "mcap:" + file;
+    run.stream = restore_run(mcap::Reader(file), file, files_.emplace().path());
+    if (!given.backend.empty()) run.stream.engine.backend = given.backend;
+    run.stream.engine.device = given.device;
+    run.stream.engine.threads = given.threads;
+    check_ = std::make_shared<ReplayCheck>(file, run.stream.track || run.stream.filter);
+    run.stream.observers.push_back(check_);
+  }
+
+  void join(RunOptions& run) {
+    if (options_.replay) replay(run);
+    if (!run.record.file.empty() && run.record.file == options_.record) {
+      refuse("record", run.record.file, "the moments of both are recorded there; name another file");
+    }
+    StreamOptions& stream = run.stream;
     StationTarget target;
     const std::size_t colon = marker_.rfind(':');
     const std::string number = colon == std::string::npos ? "" : marker_.substr(colon + 1);
@@ -133,8 +181,7 @@ class StationCommand {
     if (const std::size_t ids = family(target.family).codes.size(); static_cast<std::size_t>(target.id) >= ids) {
       refuse("marker", marker_, fmt::format("its ids are 0 to {}", ids - 1));
     }
-    const auto source = app_.get_subcommand("run")->get_option("--source")->as<std::string>();
-    target.is_live = names_camera(source) || stream.pace.fps != 0;
+    target.is_live = names_camera(run.source) || stream.pace.fps != 0;
     target.camera = mounted_camera(mount("camera-at", camera_at_));
     target.marker = mounted_marker(mount("marker-at", marker_at_));
     if (stream.log == "-") throw Error("key 'json' is '-'; both stations would write there: name a file");
@@ -153,6 +200,7 @@ class StationCommand {
   }
 
   const StationSide side_;
+  const Options& options_;
   StationRun& run_;
   LinePrefix out_text_, err_text_;
   std::ostream out_, err_;
@@ -161,98 +209,37 @@ class StationCommand {
   int exit_code_ = kOk;
   std::string marker_, camera_at_, marker_at_;
   std::vector<std::string> arguments_;
+  /// Of a replay.
+  std::optional<RestoredFiles> files_;
+  std::shared_ptr<ReplayCheck> check_;
   std::thread thread_;
 };
 
-const char* who_says(const FusedPose& fused) {
-  return !fused.has_pose ? "none" : fused.used[0] && fused.used[1] ? "both" : fused.used[0] ? "robot" : "dock";
-}
-
-Json to_json(const StationMoment& moment, const FusedPose& fused) {
-  Json line;
-  line["time_ns"] = fused.time_ns;
-  line["by"] = who_says(fused);
-  for (std::size_t side = 0; side < kStationSides; ++side) {
-    if (!moment.came[side]) continue;
-    const StationFrame& frame = moment.frames[side];
-    line[name_of(static_cast<StationSide>(side))] = {
-        {"sequence", frame.stamp.sequence}, {"mid_exposure_ns", frame.stamp.mid_exposure_ns}, {"sees", frame.sees}};
-  }
-  if (moment.came[0] && moment.came[1]) line["difference_ns"] = moment.difference_ns;
-  if (fused.has_pose) {
-    const RelativePose& robot = fused.robot;
-    line["pose"] = {{"R", robot.pose.R},
-                    {"t", robot.pose.t},
-                    {"covariance", robot.uncertainty.covariance},
-                    {"error_px", robot.uncertainty.error_px},
-                    {"ambiguity", robot.uncertainty.ambiguity()}};
-    if (robot.views == 2) {
-      line["disagreement"] = robot.disagreement;
-      line["apart"] = robot.difference;
-    }
-  }
-  if (fused.disagree) line["disagree"] = true;
-  return line;
-}
-
-/// What the moments came to, and the lines that a person reads meanwhile.
-class Moments {
+/// One JSON line a moment.
+class MomentLog final : public MomentObserver {
  public:
-  explicit Moments(std::ostream& people) : people_(people), view_(people, false, std::nullopt) {}
-
-  void add(const StationMoment& moment, const FusedPose& fused) {
-    ++moments_;
-    const bool both = fused.used[0] && fused.used[1];
-    by_both_ += both ? 1 : 0;
-    by_robot_ += fused.used[0] && !both ? 1 : 0;
-    by_dock_ += fused.used[1] && !both ? 1 : 0;
-    disagreed_ += fused.disagree ? 1 : 0;
-    if (moment.came[0] && moment.came[1]) {
-      largest_difference_ns_ = std::max(largest_difference_ns_, std::abs(moment.difference_ns));
-    }
-    const std::string blind = moment.came[0] && moment.came[1] ? "blind" : "blind or without a frame";
-    std::string who = "no pose: both stations " + blind;
-    if (both) {
-      who = fmt::format("by both, disagreement {:.1f}{}", fused.robot.disagreement,
-                        fused.disagree ? ": THEY DISAGREE" : "");
-    } else if (fused.disagree) {
-      who = "no pose: THEY DISAGREE, no pose fits both";
-    } else if (fused.has_pose) {
-      who = fused.used[0] ? "by the robot's camera alone, the dock's is " + blind
-                          : "by the dock's camera alone, the robot's is " + blind;
-    }
-    std::string place;
-    if (fused.has_pose) {
-      const std::array<double, 3>& t = fused.robot.pose.t;
-      const std::array<double, 36>& c = fused.robot.uncertainty.covariance;
-      place = fmt::format("robot at {:+.4f} {:+.4f} {:+.4f} m +- {:.2f} mm {:.2f} deg", t[0], t[1], t[2],
-                          std::sqrt(c[0] + c[7] + c[14]) * 1e3,
-                          std::sqrt(c[21] + c[28] + c[35]) * 180 / 3.14159265358979323846);
-    }
-    view_.show(moments_, place, {}, who);
+  /// `path`: "-" for `out`. Throws Error where it cannot be written.
+  MomentLog(const std::string& path, std::ostream& out) : path_(path), lines_(path == "-" ? out : file_) {
+    if (path == "-") return;
+    file_.open(path, std::ios::binary);
+    if (!file_) throw Error(path + ": the log cannot be written; check the folder and its permissions");
   }
 
-  void sum_up(StationRun& run) {
-    people_ << fmt::format(
-        "{} moment{}: {} by both, {} by the robot's camera alone, {} by the dock's alone, {} without "
-        "a pose; the stations disagreed in {}\n",
-        moments_, moments_ == 1 ? "" : "s", by_both_, by_robot_, by_dock_, moments_ - by_both_ - by_robot_ - by_dock_,
-        disagreed_);
-    people_ << fmt::format("largest difference of paired mid-exposures {:.3f} ms\n", ms_of(largest_difference_ns_));
-    for (const StationSide side : {StationSide::robot, StationSide::dock}) {
-      const StationCounts counts = run.counts(side);
-      people_ << fmt::format("{}: {} frames paired, {} alone", name_of(side), counts.paired, counts.alone);
-      if (counts.out_of_order > 0) people_ << fmt::format(", {} kept out, out of order", counts.out_of_order);
-      if (counts.dropped > 0) people_ << fmt::format(", {} dropped", counts.dropped);
-      people_ << '\n';
-    }
+  void observe(const ObservedMoment& observed) override {
+    lines_ << to_line(moment_record(observed.moment, observed.fused)) << '\n';
+  }
+
+  void finish(const BothCounts&, std::ostream& people) override {
+    if (!file_.is_open()) return;
+    file_.close();
+    if (!file_) throw Error(path_ + ": writing the log failed; check the disk's space");
+    people << "log         " << path_ << '\n';
   }
 
  private:
-  std::ostream& people_;
-  LiveView view_;
-  u64 moments_ = 0, by_both_ = 0, by_robot_ = 0, by_dock_ = 0, disagreed_ = 0;
-  std::int64_t largest_difference_ns_ = 0;
+  const std::string path_;
+  std::ofstream file_;
+  std::ostream& lines_;
 };
 
 /// Ends both streams, however it comes to its own end.
@@ -268,14 +255,46 @@ struct BothStations {
   }
 };
 
+MomentRecording recording_of(const Options& options, const VehicleFrames& frames) {
+  MomentRecording recording{options.record, options.file, {}, frames, options.gate};
+  recording.settings = {{"version", BERTH_VERSION},
+                        {"largest-difference-ms", fmt::format("{}", options.largest_difference_ms)},
+                        {"gate", fmt::format("{}", options.gate)},
+                        {"robot-frame", frames.robot},
+                        {"dock-frame", frames.dock}};
+  return recording;
+}
+
+/// Whoever gets the moments; of a replay, `check` among them. `pair`: where what is said of both goes.
+std::vector<std::unique_ptr<MomentObserver>> observers_of(const Options& options, std::ostream& out, Console& pair,
+                                                          MomentCheck*& check) {
+  const VehicleFrames frames = {checked_frame("--robot-frame", options.robot_frame),
+                                checked_frame("--dock-frame", options.dock_frame)};
+  std::vector<std::unique_ptr<MomentObserver>> observers;
+  observers.push_back(std::make_unique<MomentLines>(pair.out()));
+  if (options.replay) {
+    if (options.record.empty()) {
+      throw Error("--replay: key 'record' at the top is missing; the moments are compared with that recording");
+    }
+    auto replayed = std::make_unique<MomentCheck>(options.record);
+    check = replayed.get();
+    observers.push_back(std::move(replayed));
+  } else {
+    if (!options.record.empty()) {
+      observers.push_back(std::make_unique<MomentRecorder>(recording_of(options, frames), pair));
+    }
+    if (options.ros.on) {
+      const std::string& prefix = options.ros.frame_prefix;
+      observers.push_back(make_moment_publisher(make_ros_plan(options.ros),
+                                                {prefix + frames.robot, prefix + frames.dock}, options.gate));
+    }
+  }
+  if (!options.log.empty()) observers.push_back(std::make_unique<MomentLog>(options.log, out));
+  return observers;
+}
+
 int run_stations(const Options& options, Console& console) {
   const InterruptWatch interrupt;
-  std::ofstream log;
-  if (!options.log.empty() && options.log != "-") {
-    log.open(options.log, std::ios::binary);
-    if (!log) throw Error(options.log + ": the log cannot be written; check the folder and its permissions");
-  }
-  std::ostream& lines = options.log == "-" ? console.out() : log;
   StationPairingConfig config;
   config.largest_difference_ns = std::llround(options.largest_difference_ms * 1e6);
   StationRun run(config, std::llround(options.wait_ms * 1e6));
@@ -283,9 +302,12 @@ int run_stations(const Options& options, Console& console) {
   std::ostream& people = options.log == "-" ? console.err() : console.out();
   StationCommand robot(StationSide::robot, options, console, people, mutex, run);
   StationCommand dock(StationSide::dock, options, console, people, mutex, run);
-  LinePrefix both_text(fmt::format("{:<6} ", "both"), people, mutex);
-  std::ostream both(&both_text);
-  Moments moments(both);
+  LinePrefix both_text(fmt::format("{:<6} ", "both"), people, mutex), err_text("", console.err(), mutex);
+  std::ostream both(&both_text), err(&err_text);
+  Console pair(both, err, false);
+  MomentCheck* check = nullptr;
+  const auto observers = observers_of(options, console.out(), pair, check);
+  for (const auto& observer : observers) observer->begin();
   {
     const BothStations stations = {robot, dock, run};
     robot.start();
@@ -293,17 +315,13 @@ int run_stations(const Options& options, Console& console) {
     StationMoment moment;
     while (run.next(moment)) {
       const FusedPose fused = fuse(run.stations(), moment, options.gate);
-      moments.add(moment, fused);
-      if (!options.log.empty()) lines << to_line(to_json(moment, fused)) << '\n';
+      const BothCounts counts = run.counts();
+      for (const auto& observer : observers) observer->observe({moment, fused, counts, run.is_live()});
     }
   }
-  moments.sum_up(run);
-  if (log.is_open()) {
-    log.close();
-    if (!log) throw Error(options.log + ": writing the log failed; check the disk's space");
-    both << "log         " << options.log << '\n';
-  }
-  if (robot.complained() || dock.complained()) return kBadInput;
+  for (const auto& observer : observers) observer->finish(run.counts(), both);
+  if (robot.complained() || dock.complained() || pair.complained()) return kBadInput;
+  if (check != nullptr && !check->is_equal()) return kNoResult;
   return std::max(robot.exit_code(), dock.exit_code());
 }
 
@@ -321,6 +339,7 @@ void add_stations(CLI::App& app, Console& console, int& exit_code) {
     CLI::App of_file;
     add_options(of_file, *options);
     std::vector<std::string> arguments = section_arguments(options->file, *command, "", kSections, kHelp);
+    if (options->ros.on) arguments.emplace_back("--ros");  // which others there need
     std::reverse(arguments.begin(), arguments.end());
     of_file.parse(std::move(arguments));
     exit_code = run_stations(*options, console);

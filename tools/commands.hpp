@@ -7,10 +7,10 @@
 
 namespace berth::cli {
 
-struct StreamOptions;
+struct RunOptions;
 
 /// What another has to say of a run's options, once they are checked and before anything is opened.
-using RunPart = std::function<void(StreamOptions&)>;
+using RunPart = std::function<void(RunOptions&)>;
 
 /// Each adds one subcommand, whose callback runs it and leaves its exit code in `exit_code`.
 void add_calibrate(CLI::App& app, Console& console, int& exit_code);

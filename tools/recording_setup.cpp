@@ -10,6 +10,7 @@
 #include "berth/error.hpp"
 #include "camera/recorded_frame.hpp"
 #include "frame_json.hpp"
+#include "moment_record.hpp"
 #include "output_file.hpp"
 
 namespace berth::cli {
@@ -91,6 +92,9 @@ RestoredFiles::~RestoredFiles() {
 
 StreamOptions restore_run(const mcap::Reader& recording, const std::string& path, const std::string& folder) {
   const mcap::Metadata* const run = recording.find_metadata(kRunMetadata);
+  if (recording.find_metadata(kStationsMetadata) != nullptr) {
+    throw Error(path + ": it is of two stations; berth stations FILE --replay runs them again");
+  }
   if (run == nullptr || run->values.count(kOptions) == 0) {
     throw Error(path + ": it does not say how it was made: no recording of berth run; use --source mcap:" + path +
                 " with the options that fit");

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "berth/error.hpp"
+#include "moment_publisher.hpp"
 #include "mount.hpp"
 
 namespace berth::cli {
@@ -255,6 +256,7 @@ namespace {
 }  // namespace
 
 std::shared_ptr<FrameObserver> make_ros_publisher(const RosPlan&) { refuse_ros(); }
+std::unique_ptr<MomentObserver> make_moment_publisher(const RosPlan&, const VehicleFrames&, double) { refuse_ros(); }
 #endif
 
 }  // namespace berth::cli

@@ -64,6 +64,7 @@ void StationRun::begin(StationSide side, const StationTarget& target, const Obse
   station.camera = target.camera;
   station.marker = target.marker;
   station.marker_size_m = size_m;
+  is_live_ = is_live_ || target.is_live;
   has_begun_[index_of(side)] = true;
   room_.notify_all();
   // One that cannot be opened is a mistake of the user's, and no loss.
@@ -74,7 +75,6 @@ void StationRun::begin(StationSide side, const StationTarget& target, const Obse
 
 void StationRun::push(StationSide side, const FrameStamp& stamp, const Detection* marker, bool is_live) {
   std::unique_lock lock(mutex_);
-  is_live_ = is_live_ || is_live;
   if (!is_live) room_.wait(lock, [&] { return !pairing_.is_full(side) || is_stopped_; });
   pairing_.push(side, stamp, marker, monotonic_ns());
   news_.notify_one();
@@ -108,9 +108,9 @@ void StationRun::stop() {
   room_.notify_all();
 }
 
-StationCounts StationRun::counts(StationSide side) {
+BothCounts StationRun::counts() {
   const std::lock_guard lock(mutex_);
-  return pairing_.counts(side);
+  return {pairing_.counts(StationSide::robot), pairing_.counts(StationSide::dock)};
 }
 
 }  // namespace berth::cli

@@ -9,6 +9,7 @@
 
 #include "berth/station_pairing.hpp"
 #include "frame_observer.hpp"
+#include "moment_observer.hpp"
 
 namespace berth::cli {
 
@@ -38,9 +39,10 @@ class StationRun {
   /// Nobody takes moments any more: streams need not wait.
   void stop();
 
-  /// Both complete when the first moment has come.
+  /// These three are complete when the first moment has come. Whether frames of a station come at a pace of their own.
+  bool is_live() const { return is_live_; }
   const StationPair& stations() const { return stations_; }
-  StationCounts counts(StationSide side);
+  BothCounts counts();
 
  private:
   class Observer;

@@ -26,6 +26,7 @@ struct StationPairingConfig {
 
 /// One station's frame, as far as the other needs it.
 struct StationFrame {
+  /// Its clock's name is the pairing's, and valid as long as that.
   FrameStamp stamp;
   /// Whether the marker was read, and what was read of it.
   bool sees = false;

@@ -121,6 +121,7 @@ void StationPairing::push(StationSide side, const FrameStamp& stamp, const Detec
   Waiting& place = queue.ring[(queue.first + queue.count++) % queue.ring.size()];
   place.since_ns = now_ns;
   place.frame.stamp = stamp;
+  place.frame.stamp.clock = impl_->clock.c_str();  // the source's own may end with it
   place.frame.sees = marker != nullptr;
   if (marker != nullptr) place.frame.marker = *marker;
 }

@@ -21,7 +21,8 @@ FRAMES = 6
 
 
 def berth(*arguments):
-    subprocess.run([BERTH, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
+    # Scenarios name each other from the repository's root.
+    subprocess.run([BERTH, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL, cwd=Path(SCENARIOS).parent)
 
 
 def check_by_mcap(path, images):
@@ -63,6 +64,37 @@ def check_by_rosbags(path):
         assert count == reader.message_count > 6 * FRAMES
 
 
+def check_stations(folder):
+    """Two stations' moments: the robot in the dock's frame, and back in tf."""
+    path, log = folder / "both.mcap", folder / "log.jsonl"
+    berth("stations", f"{SCENARIOS}/stations.toml", "--json", log, "--record", path, "--robot-frame", "r1/base_link")
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    topics = {}
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            topics.setdefault(channel.topic, []).append(decoded)
+        assert [a.name for a in reader.iter_attachments()] == ["stations.toml"]
+        assert dict((m.name, m.metadata) for m in reader.iter_metadata())["berth.end"] == {"moments": str(len(lines))}
+    assert [json.loads(one.data) for one in topics["/berth/moment"]] == lines
+    assert len(topics["/berth/pose"]) == len(topics["/tf"]) == len(lines) == 20
+    for line, pose, tf in zip(lines, topics["/berth/pose"], topics["/tf"]):
+        where, (back,) = pose.pose.pose.position, tf.transforms
+        assert pose.header.frame_id == back.child_frame_id == "dock" and back.header.frame_id == "r1/base_link"
+        assert [where.x, where.y, where.z] == line["pose"]["t"]
+        assert list(pose.pose.covariance) == line["pose"]["covariance"]
+        # There and back is nowhere.
+        turn, t = [line["pose"]["R"][i:i + 3] for i in (0, 3, 6)], back.transform.translation
+        for row, there in zip(turn, line["pose"]["t"]):
+            assert abs(row[0] * t.x + row[1] * t.y + row[2] * t.z + there) < 1e-12
+    status = topics["/diagnostics"][0].status
+    assert [one.name for one in status] == ["berth: stations", "berth: recorder"]
+    assert "disagreement" in [value.key for value in status[0].values]
+    with AnyReader([path]) as reader:
+        for connection, _, raw_message in reader.messages():
+            reader.deserialize(raw_message, connection.msgtype)
+
+
 with tempfile.TemporaryDirectory() as folder:
     raw, png, saved = (Path(folder) / name for name in ("raw.mcap", "png.mcap", "saved.mcap"))
     run = ("run", "--source", f"sim:{SCENARIOS}/approach.toml", "--max-frames", FRAMES, "--record")
@@ -80,3 +112,4 @@ with tempfile.TemporaryDirectory() as folder:
     berth("recover", raw, "-o", saved)
     check_by_rosbags(saved)
     assert saved.read_bytes()[-2000:-1000] == whole[-2000:-1000]
+    check_stations(Path(folder))

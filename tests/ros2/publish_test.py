@@ -81,11 +81,13 @@ class Published(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
 
-    def berth(self, *arguments):
-        run = subprocess.Popen([BERTH, "run", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                               cwd=ROOT)
+    def berth_command(self, *arguments):
+        run = subprocess.Popen([BERTH, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT)
         self.addCleanup(run.kill)
         return run
+
+    def berth(self, *arguments):
+        return self.berth_command("run", *arguments)
 
     def output_of(self, run):
         output = run.communicate(timeout=120)[0]
@@ -208,6 +210,71 @@ class Published(unittest.TestCase):
         for picture in pictures:
             self.assertEqual(picture.format_, "png")
             self.assertEqual(bytes(picture.data_[:8]), b"\x89PNG\r\n\x1a\n")
+
+    def test_the_pose_of_two_stations(self):
+        number = FIRST_DOMAIN + 2
+        domain = DomainParticipant(number)
+        pose = reader(domain, "pair/pose", ros.PoseWithCovarianceStamped)
+        dock = reader(domain, "pair/detected_dock_pose", ros.PoseStamped)
+        tf = reader(domain, "tf", ros.TFMessage)
+        diagnostics = reader(domain, "pair/diagnostics", ros.DiagnosticArray)
+        own = reader(domain, "robot1/pose", ros.PoseWithCovarianceStamped)
+        log = pathlib.Path(self.folder.name, "log.jsonl")
+        top = (f'ros = true\nros-domain = {number}\nros-namespace = "pair"\nros-topic = "tf=/tf"\nros-wait = 30\n'
+               'ros-source-time = true\nros-frame-prefix = "r1/"\nrobot-frame = "base_footprint"\n')
+        file = pathlib.Path(self.folder.name, "stations.toml")
+        station = (ROOT / "scenarios/stations.toml").read_text().replace(
+            "[robot]", f'[robot]\nros = true\nros-domain = {number}\nros-namespace = "robot1"\nros-wait = 30\n'
+            'ros-topic = ["tf=off", "detections=off", "camera_info=off", "diagnostics=off", "detected_dock_pose=off"]', 1)
+        file.write_text(top + station)
+        output = self.output_of(self.berth_command("stations", str(file), "--json", str(log)))
+        lines = [json.loads(line) for line in log.read_text().splitlines()]
+        self.assertEqual(len(lines), 20)
+        self.assertIn("both   ROS 2       20 moments published in domain", output)
+        poses, docks, tfs, reports = taken(pose), taken(dock), taken(tf), taken(diagnostics)
+        self.assertEqual(len(taken(own)), 20)
+        for messages in (poses, docks, tfs):
+            self.assertEqual(len(messages), 20)
+        for line, p, d, t in zip(lines, poses, docks, tfs):
+            self.assertEqual(ns(p.header_), line["time_ns"])
+            self.assertEqual(p.header_.frame_id_, "r1/dock")
+            self.assert_pose(p.pose_.pose_.position_, p.pose_.pose_.orientation_, line["pose"])
+            self.assertEqual(list(p.pose_.covariance_), line["pose"]["covariance"])
+            # The dock from the robot: the way back.
+            R, t_robot = line["pose"]["R"], line["pose"]["t"]
+            back = {"R": [R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8]],
+                    "t": [-sum(R[3 * i + j] * t_robot[i] for i in range(3)) for j in range(3)]}
+            self.assertEqual(len(t.transforms_), 1)
+            (one,) = t.transforms_
+            self.assertEqual((one.header_.frame_id_, one.child_frame_id_), ("r1/base_footprint", "r1/dock"))
+            self.assertEqual(d.header_.frame_id_, "r1/base_footprint")
+            for position, orientation in ((one.transform_.translation_, one.transform_.rotation_),
+                                          (d.pose_.position_, d.pose_.orientation_)):
+                for a, b in zip([position.x_, position.y_, position.z_], back["t"]):
+                    self.assertAlmostEqual(a, b, delta=1e-12)
+                for a, b in zip(rotation(orientation), back["R"]):
+                    self.assertAlmostEqual(a, b, delta=1e-12)
+        (status,) = reports[-1].status_
+        values = {v.key_: v.value_ for v in status.values_}
+        self.assertEqual((status.name_, values["moments"], values["by_both"]), ("berth: stations", "20", "20"))
+        self.assertEqual(float(values["disagreement"]), round(lines[-1]["disagreement"], 3))
+
+    def test_stations_that_disagree_give_no_pose(self):
+        number = FIRST_DOMAIN + 1
+        domain = DomainParticipant(number)
+        pose = reader(domain, "pose", ros.PoseWithCovarianceStamped)
+        diagnostics = reader(domain, "diagnostics", ros.DiagnosticArray)
+        file = pathlib.Path(self.folder.name, "stations.toml")
+        # A camera turned by 5 degrees on its mount.
+        bent = (ROOT / "scenarios/stations.toml").read_text().replace("0,0.12,0,0,0,0", "0,0.12,0,5,0,0", 1)
+        file.write_text(f"ros = true\nros-domain = {number}\nros-wait = 30\n"
+                        'ros-topic = ["detected_dock_pose=off", "tf=off"]\n' + bent)
+        self.output_of(self.berth_command("stations", str(file)))
+        self.assertEqual(taken(pose), [])
+        (status,) = taken(diagnostics)[-1].status_
+        values = {v.key_: v.value_ for v in status.values_}
+        self.assertEqual(values["disagreed"], "20")
+        self.assertGreater(float(values["disagreement"]), 28)
 
     def test_a_reader_behind_a_cut_cable_holds_no_frame_up(self):
         # A reliable reader that asks for all, and from its first message on neither takes nor acknowledges anything: to
