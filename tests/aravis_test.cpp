@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <fstream>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "aravis/fake_gige_process.hpp"
 #include "berth/detector.hpp"
@@ -87,6 +89,8 @@ TEST(AravisOptions, ReadsEveryKey) {
   EXPECT_FALSE(options.resend);
   EXPECT_EQ(options.time, AravisOptions::Time::ptp);
   EXPECT_EQ(options.watchdog_ms, 250);
+  EXPECT_FALSE(options.chunk_time);
+  EXPECT_TRUE(parse_aravis("GV77,timestamp=chunk,time=ptp").chunk_time);
   EXPECT_EQ(parse_aravis("GV77,trigger=Line1").trigger, "Line1");
 }
 
@@ -101,6 +105,8 @@ TEST(AravisOptions, SaysWhatIsWrongWithAKey) {
   EXPECT_THAT(message("GV77,trigger=Line1,fps=30"), AllOf(HasSubstr("fps"), HasSubstr("trigger")));
   EXPECT_THAT(message("GV77,resend=maybe"), HasSubstr("on or off"));
   EXPECT_THAT(message("GV77,time=gps"), HasSubstr("host, camera or ptp"));
+  EXPECT_THAT(message("GV77,timestamp=trailer"), HasSubstr("leader or chunk"));
+  EXPECT_THAT(message("GV77,timestamp=chunk"), AllOf(HasSubstr("'chunk'"), HasSubstr("time=camera or time=ptp")));
   EXPECT_THAT(message("GV77,speed=2"), AllOf(HasSubstr("speed"), HasSubstr("retention_ms")));
 }
 
@@ -202,6 +208,51 @@ TEST_F(Aravis, TakesTimesFromTheCamera) {
     EXPECT_GT(frame.stamp.exposure_start_ns, 0);
     EXPECT_EQ(frame.stamp.mid_exposure_ns - frame.stamp.exposure_start_ns, 2'000'000);
   }
+}
+
+TEST_F(Aravis, TakesTimesFromChunkData) {
+  std::vector<std::string> with_chunks = arguments();
+  const std::string sent = *folder_ / "sent";
+  with_chunks.push_back("chunks=4");
+  with_chunks.push_back("sent=" + sent);
+  const FakeGigeProcess camera(with_chunks);
+  {
+    const auto source = open_source(kCamera + ",fps=50,exposure_us=4000,time=camera,timestamp=chunk");
+    std::vector<std::int64_t> times;
+    for (int i = 0; i < 8; ++i) {
+      const SourceFrame frame = *source->next();
+      EXPECT_NE(name_of(frame), "") << "not one of the images shown";
+      EXPECT_STREQ(frame.stamp.clock, "camera");
+      EXPECT_EQ(frame.stamp.mid_exposure_ns - frame.stamp.exposure_start_ns, 2'000'000);
+      times.push_back(frame.stamp.exposure_start_ns);
+    }
+    // Those that came without one are none.
+    EXPECT_GE(source->health().incomplete, 2U);
+    // The chunk's, in ticks of 8 ns, is 3 ms before the leader's.
+    std::set<std::int64_t> of_chunks;
+    std::ifstream file(sent);
+    for (std::int64_t time = 0; file >> time;) of_chunks.insert((time - 3'000'000) / 8 * 8);
+    for (const std::int64_t time : times) EXPECT_EQ(of_chunks.count(time), 1U) << time;
+  }
+  // The same camera without: its leader's times, and every frame.
+  const auto source = open_source(kCamera + ",fps=50,timestamp=leader");
+  for (int i = 0; i < 8; ++i) ASSERT_NE(name_of(*source->next()), "");
+  EXPECT_EQ(source->health().incomplete, 0U);
+}
+
+TEST_F(Aravis, SaysWhatChunkDataTheCameraHas) {
+  {
+    const FakeGigeProcess camera(arguments());
+    EXPECT_THAT(refusal(",time=camera,timestamp=chunk"),
+                AllOf(HasSubstr("sends no chunk data"), HasSubstr("leave timestamp=chunk out")));
+  }
+  const std::string nodes = folder_->write("gain", std::string(R"(
+    <Boolean Name="ChunkModeActive"><Value>0</Value></Boolean>
+    <Enumeration Name="ChunkSelector"><EnumEntry Name="Gain"><Value>1</Value></EnumEntry><Value>1</Value></Enumeration>)"));
+  std::vector<std::string> with_nodes = arguments();
+  with_nodes.push_back("nodes=" + nodes);
+  const FakeGigeProcess camera(with_nodes);
+  EXPECT_THAT(refusal(",time=camera,timestamp=chunk"), HasSubstr("the camera has no chunk Timestamp; it has Gain;"));
 }
 
 TEST(AravisWithoutACamera, SaysSo) {

@@ -6,9 +6,11 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <optional>
 #include <thread>
 
 #include "berth/error.hpp"
+#include "camera/aravis_chunks.hpp"
 #include "camera/aravis_finder.hpp"
 #include "camera/aravis_formats.hpp"
 #include "camera/decoders.hpp"
@@ -34,6 +36,7 @@ class AravisCamera final : public LiveCamera {
     set_rate();
     set_gain();
     if (options_.time == AravisOptions::Time::ptp) wait_for_ptp();
+    if (options_.chunk_time) chunk_time_.emplace(camera_.get(), options_.name);
     start();
   }
 
@@ -335,7 +338,14 @@ class AravisCamera final : public LiveCamera {
       filled.from_start = false;
       return;
     }
-    filled.time_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
+    if (!chunk_time_) {
+      filled.time_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
+    } else if (!filled.damaged) {
+      const std::optional<std::int64_t> time_ns = chunk_time_->of(buffer);
+      // Without its time it is not whole; the leader's would be another one.
+      filled.damaged = !time_ns;
+      filled.time_ns = time_ns.value_or(0);
+    }
     filled.clock = options_.time == AravisOptions::Time::ptp ? "ptp" : "camera";
     filled.from_start = true;
   }
@@ -343,6 +353,7 @@ class AravisCamera final : public LiveCamera {
   const AravisOptions options_;
   const std::shared_ptr<std::atomic<bool>> is_gone_ = std::make_shared<std::atomic<bool>>(false);
   Object<ArvCamera> camera_;
+  std::optional<ChunkTime> chunk_time_;
   std::vector<Object<ArvBuffer>> buffers_;
   Object<ArvStream> stream_;
   ArvPixelFormat pixel_format_ = 0;

@@ -41,6 +41,8 @@ struct AravisOptions {
     /// The camera's own clock, which it sets by PTP; it must be slave when frames begin.
     ptp,
   } time = Time::host;
+  /// Of the camera's times, the one in the chunk data at a frame's end in place of the one in its leader.
+  bool chunk_time = false;
   int watchdog_ms = 1000;
   /// LiveOptions::repeats
   bool repeats = false;

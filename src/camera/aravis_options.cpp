@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kKeys =
     "width, height, x, y, fps, format, exposure_us, gain, trigger, packet_size, buffers, retention_ms, resend, time, "
-    "watchdog_ms, repeats";
+    "timestamp, watchdog_ms, repeats";
 
 bool set_image(AravisOptions& options, const SourceKeys& keys, const std::string& key, const std::string& value) {
   if (key == "width") {
@@ -61,6 +61,9 @@ bool set_transport(AravisOptions& options, const SourceKeys& keys, const std::st
     options.time = value == "host"     ? AravisOptions::Time::host
                    : value == "camera" ? AravisOptions::Time::camera
                                        : AravisOptions::Time::ptp;
+  } else if (key == "timestamp") {
+    if (value != "leader" && value != "chunk") keys.refuse(key, value, "give leader or chunk");
+    options.chunk_time = value == "chunk";
   } else if (key == "watchdog_ms") {
     options.watchdog_ms = keys.whole(key, value, 1, 60'000);
   } else if (key == "repeats") {
@@ -91,6 +94,10 @@ AravisOptions parse_aravis(const std::string& text) {
   if (!options.trigger.empty() && options.fps > 0) {
     throw bad_field("--source", "aravis:…,fps", "given beside trigger",
                     "leave one of the two out: whoever triggers sets the rate");
+  }
+  if (options.chunk_time && options.time == AravisOptions::Time::host) {
+    throw bad_field("--source", "aravis:…,timestamp", "'chunk'",
+                    "give time=camera or time=ptp, too: the host's time is that of a frame's first packet");
   }
   return options;
 }

@@ -4,6 +4,7 @@
 // It is there once it has written a line, and until its standard input ends. A number on a line there: so many frames
 // more, then it is silent. Keys:
 //   address=A   of the interface, 127.0.0.1 unless given: one camera has each
+//   chunks=N    has chunk data (chunk_data.hpp), without which every Nth frame comes
 //   lost=SHARE  of the packets, which it loses on the way
 //   nodes=FILE  of GenICam nodes that it has besides its own
 //   sent=FILE   where it writes each frame's time as it takes it, a line each, whatever becomes of the process
@@ -14,16 +15,20 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "aravis/chunk_data.hpp"
 #include "camera/sources.hpp"
 
 namespace {
@@ -32,6 +37,8 @@ struct Show {
   std::vector<berth::GrayImage> images;
   std::atomic<std::size_t> next = 0, most = SIZE_MAX;
   int sent = -1;
+  /// 0: no chunk data.
+  std::size_t chunks = 0;
   ArvGvFakeCamera* camera = nullptr;
 };
 
@@ -58,20 +65,39 @@ void draw(ArvBuffer* buffer, void* data, guint32, guint32, ArvPixelFormat) {
     std::memcpy(pixels + static_cast<std::ptrdiff_t>(y) * width, image.view().row(y),
                 static_cast<std::size_t>(columns));
   }
+  if (show.chunks == 0) return;
+  berth::test::write_chunks(arv_gv_fake_camera_get_fake_camera(show.camera), buffer, show.next % show.chunks != 0);
 }
 
-/// Writes the fake camera's description with these nodes beside them, and returns the file's name.
+/// The fake camera's own description, with these nodes beside its own.
 std::string describe(const std::string& nodes) {
   ArvFakeCamera* plain = arv_fake_camera_new("plain");
   std::size_t bytes = 0;
   const char* text = arv_fake_camera_get_genicam_xml(plain, &bytes);
   std::string description(text, bytes);
   g_object_unref(plain);
-  std::ifstream file(nodes);
-  description.insert(description.rfind("</RegisterDescription>"),
-                     std::string(std::istreambuf_iterator<char>(file), {}));
-  std::ofstream(nodes + ".xml") << description;
-  return nodes + ".xml";
+  description.insert(description.rfind("</RegisterDescription>"), nodes);
+  return description;
+}
+
+/// The file of the description that the keys ask for; empty where the camera's own does.
+std::string description_file(const std::map<std::string, std::string>& keys) {
+  const auto nodes = keys.find("nodes");
+  if (nodes == keys.end() && keys.count("chunks") == 0) return "";
+  std::string given;
+  if (nodes != keys.end()) {
+    std::ifstream file(nodes->second);
+    given.assign(std::istreambuf_iterator<char>(file), {});
+  }
+  std::string description = describe(given);
+  if (keys.count("chunks") > 0) description = berth::test::with_chunk_nodes(std::move(description));
+  std::string path = std::filesystem::temp_directory_path() / "fake-gige-XXXXXX";
+  const int file = mkstemp(path.data());
+  if (file < 0 || write(file, description.data(), description.size()) < 0) {
+    throw std::invalid_argument(path + ": it cannot be written");
+  }
+  close(file);
+  return path;
 }
 
 }  // namespace
@@ -92,14 +118,19 @@ int main(int argc, char** argv) try {
     show.sent = open(keys["sent"].c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
     if (show.sent < 0) throw std::invalid_argument(keys["sent"] + ": it cannot be written");
   }
-  const std::string description = keys.count("nodes") > 0 ? describe(keys["nodes"]) : "";
+  const std::string description = description_file(keys);
   const std::string address = keys.count("address") > 0 ? keys["address"] : "127.0.0.1";
   ArvGvFakeCamera* camera =
       arv_gv_fake_camera_new_full(address.c_str(), "GV77", description.empty() ? nullptr : description.c_str());
   if (arv_gv_fake_camera_is_running(camera) == 0) {
     return std::fprintf(stderr, "UDP port 3956 of %s cannot be had\n", address.c_str()), 1;
   }
+  if (!description.empty()) unlink(description.c_str());  // it has been read
   show.camera = camera;
+  if (keys.count("chunks") > 0) {
+    show.chunks = std::stoul(keys["chunks"]);
+    berth::test::set_tick_frequency(arv_gv_fake_camera_get_fake_camera(camera));
+  }
   if (keys.count("lost") > 0) lose(camera, std::stod(keys["lost"]));
   arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), draw, &show);
   std::puts("ready");
