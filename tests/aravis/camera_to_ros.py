@@ -4,7 +4,8 @@
 Aravis' fake GigE Vision camera, `berth run --stream --ros`, a subscriber of PyPI's cyclonedds with types of its own. The
 camera is killed after N frames, and a second one sends N more. Whatever the machine: every frame that the cameras took
 has become a pose or is counted, each as it was shown; every pose has arrived, stamped with the camera's time of its
-frame. How many came in time, how old and what the process holds is printed.
+frame. How many came in time, how old and what the process holds is printed. All of it is on loopback, unless
+camera_to_ros_veth.sh has put a network between.
 """
 import argparse
 import bisect
@@ -25,7 +26,11 @@ import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "ros2"))
-os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
+# The camera's address, where the network is made already.
+ADDRESS = os.environ.get("BERTH_TEST_CAMERA", "127.0.0.1")
+IS_LOOPBACK = ADDRESS == "127.0.0.1"
+if IS_LOOPBACK:
+    os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
 <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
 <Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>40</MaxAutoParticipantIndex>
 <Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
@@ -41,7 +46,8 @@ def enter_own_network():
         fcntl.ioctl(control, set_flags, struct.pack("16sh", b"lo", up).ljust(40, b"\0"))
 
 
-enter_own_network()  # before there is a second thread
+if IS_LOOPBACK:
+    enter_own_network()  # before there is a second thread
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
@@ -78,7 +84,8 @@ class Camera:
 
     def __init__(self, program, scenario, shown, path, lost):
         self.path = pathlib.Path(path)
-        self.process = subprocess.Popen([program, scenario, str(shown), f"sent={self.path}", f"lost={lost}"],
+        self.process = subprocess.Popen([program, scenario, str(shown), f"sent={self.path}", f"lost={lost}",
+                                         f"address={ADDRESS}"],
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         check(self.process.stdout.readline() == b"ready\n", "the fake camera does not run")
         self.ready_ns = time.time_ns()
@@ -203,7 +210,7 @@ def fly(given, folder):
     camera()
     subscriber = Subscriber()
     subscriber.start()
-    source = (f"aravis:127.0.0.1,width=640,height=480,fps={FPS},packet_size=9000,exposure_us={EXPOSURE_NS // 1000},"
+    source = (f"aravis:{ADDRESS},width=640,height=480,fps={FPS},packet_size=9000,exposure_us={EXPOSURE_NS // 1000},"
               f"resend=off,time=camera,buffers=32,watchdog_ms=500")
     run = Run([given.berth, "run", "--source", source, "--stream", "--slots=8", "--json", log, *engine, "--ros",
                f"--ros-domain={DOMAIN}", "--ros-source-time", "--ros-wait=30", "--ros-dock=tag36h11:0",

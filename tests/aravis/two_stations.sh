@@ -4,10 +4,8 @@
 # `berth stations` says by which it knows the robot's pose: by both, by the dock's alone while the robot's camera is
 # dead, by both again; then Ctrl-C ends it. Exits with 77 where the machine has no network to give.
 set -eu
-if [ -z "${IN_OWN_NETWORK:-}" ]; then
-  command -v ip >/dev/null && unshare -rn true 2>/dev/null || { echo "skipped: no network namespaces here"; exit 77; }
-  IN_OWN_NETWORK=1 exec unshare -rn "$0" "$@"
-fi
+. "$(dirname "$0")/own_network.sh"
+enter_own_network "$0" "$@"
 berth=$1 fake=$2 root=$3
 folder=$(mktemp -d)
 robot='' dock='' stations=''
@@ -16,7 +14,6 @@ finish() {
   rm -rf "$folder"
 }
 trap finish EXIT
-ip link set lo up
 ip address add 127.0.0.2/8 dev lo
 cd "$root"
 mkfifo "$folder/open"
