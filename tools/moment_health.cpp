@@ -29,9 +29,9 @@ const ros2::DiagnosticStatus& MomentHealth::report() {
     message_ = fmt::format("the stations disagree in {} of {} moments", new_.disagreed, new_.moments);
   } else if (new_.by_both < new_.moments) {
     level = ros2::Level::warn;
-    message_ = fmt::format("{} of {} moments by both, {} by the robot's camera alone, {} by the dock's, {} without a "
-                           "pose",
-                           new_.by_both, new_.moments, new_.by_robot, new_.by_dock, new_.without_pose());
+    message_ =
+        fmt::format("{} of {} moments by both, {} by the robot's camera alone, {} by the dock's, {} without a pose",
+                    new_.by_both, new_.moments, new_.by_robot, new_.by_dock, new_.without_pose());
   }
   status_.level = level;
   status_.name = "berth: stations";

@@ -59,8 +59,8 @@ void MomentRecorder::begin() {
   file_->begin(wall_ns());
   file_->add(mcap::Metadata{kStationsMetadata, recording_.settings});
   std::ifstream stations(recording_.stations_file, std::ios::binary);
-  file_->add(mcap::Attachment{"stations.toml", "application/toml",
-                              mcap::Bytes(std::istreambuf_iterator<char>(stations), {})});
+  file_->add(
+      mcap::Attachment{"stations.toml", "application/toml", mcap::Bytes(std::istreambuf_iterator<char>(stations), {})});
   pose_ = file_->add_topic<ros2::PoseWithCovarianceStamped>("/berth/pose");
   transform_ = file_->add_topic<ros2::TransformList>("/tf");
   diagnostics_ = file_->add_topic<ros2::DiagnosticArray>("/diagnostics");

@@ -35,7 +35,8 @@ ChunkTime::ChunkTime(ArvCamera* camera, const std::string& name) {
   if (failure) fail(name, "the camera does not switch its chunk data on" + failure.because());
   const std::vector<std::string> chunks = entries_of(camera, "ChunkSelector");
   ArvDevice* device = arv_camera_get_device(camera);
-  if (std::find(chunks.begin(), chunks.end(), kChunk) == chunks.end() || arv_device_get_feature(device, kNode) == nullptr) {
+  if (std::find(chunks.begin(), chunks.end(), kChunk) == chunks.end() ||
+      arv_device_get_feature(device, kNode) == nullptr) {
     std::string all;
     for (const std::string& chunk : chunks) all += (all.empty() ? "" : ", ") + chunk;
     fail(name, std::string("the camera has no chunk ") + kChunk + "; it has " + (all.empty() ? "none" : all));
