@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <cstring>
 #include <stdexcept>
 
@@ -72,6 +71,7 @@ void change_leader(unsigned char* packet) {
 }  // namespace
 
 /// In place of the C library's, for the fake camera's sockets.
+// NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name): its names are reserved ones
 extern "C" ssize_t sendmsg(int socket, const msghdr* message, int flags) {
   std::array<unsigned char, 44> leader = {};
   iovec part = {leader.data(), leader.size()};
