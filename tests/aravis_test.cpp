@@ -234,10 +234,11 @@ TEST_F(Aravis, TakesTimesFromChunkData) {
     for (std::int64_t time = 0; file >> time;) of_chunks.insert((time - 3'000'000) / 8 * 8);
     for (const std::int64_t time : times) EXPECT_EQ(of_chunks.count(time), 1U) << time;
   }
-  // The same camera without: its leader's times, and every frame.
+  // The same camera without: a fourth of the frames has no chunk, and all of them come, but for what a busy machine
+  // loses.
   const auto source = open_source(kCamera + ",fps=50,timestamp=leader");
-  for (int i = 0; i < 8; ++i) ASSERT_NE(name_of(*source->next()), "");
-  EXPECT_EQ(source->health().incomplete, 0U);
+  for (int i = 0; i < 24; ++i) ASSERT_NE(name_of(*source->next()), "");
+  EXPECT_LT(source->health().incomplete, 4U);
 }
 
 TEST_F(Aravis, SaysWhatChunkDataTheCameraHas) {
