@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "bundle_show.hpp"
+#include "exact_math.hpp"
 #include "frame/result_digest.hpp"
 #include "marker_filters.hpp"
 #include "truth_score.hpp"
@@ -20,10 +21,20 @@ constexpr double kSaidExcess = 25;
 
 double range_m(const Pose& pose) { return distance_m(pose, Pose()); }
 
+/// A turn may be off by so many of the deviations that its covariance states.
+constexpr double kMostDeviations = 5;
+
 /// A torn frame's corners are of two instants: how the marker is tilted is then anybody's guess, where it is not.
-bool is_off(const Pose& pose, const Pose& truth, bool is_torn) {
-  return !(distance_m(pose, truth) <= kWrongShare * range_m(truth)) ||
-         (!is_torn && !(angle_deg(pose, truth) <= kWrongDegrees));
+/// `covariance`: of the pose, or null.
+bool is_off(const Pose& pose, const Pose& truth, const double* covariance, bool is_torn) {
+  if (!(distance_m(pose, truth) <= kWrongShare * range_m(truth))) return true;
+  if (is_torn) return false;
+  double most_deg = kWrongDegrees;
+  if (covariance != nullptr) {
+    const double turn = std::sqrt(covariance[21] + covariance[28] + covariance[35]);
+    most_deg = std::max(most_deg, kMostDeviations * turn * 180 / kPi);
+  }
+  return !(angle_deg(pose, truth) <= most_deg);
 }
 
 bool is_finite(const Pose& pose) {
@@ -156,9 +167,11 @@ bool SoakCheck::is_near(const Detection& detection, const FilmedFrame& filmed) c
   for (const std::size_t picture : {filmed.picture, filmed.below}) {
     const TruthMarker* const truth = truth_of(detection, truths_[picture]);
     if (truth == nullptr) continue;
-    if (!detection.has_pose || !is_off(detection.pose, truth->pose, is_torn)) return true;
     const std::optional<PoseUncertainty>& said = detection.pose_uncertainty;
-    if (said && said->has_other && said->other_excess < kSaidExcess && !is_off(said->other, truth->pose, is_torn))
+    const double* const covariance = said ? said->covariance.data() : nullptr;
+    if (!detection.has_pose || !is_off(detection.pose, truth->pose, covariance, is_torn)) return true;
+    if (said && said->has_other && said->other_excess < kSaidExcess &&
+        !is_off(said->other, truth->pose, said->other_covariance.data(), is_torn))
       return true;
   }
   return false;
@@ -194,7 +207,8 @@ void SoakCheck::check_poses(const ObservedFrame& frame, const FilmedFrame& filme
     bool near = false;
     for (const std::size_t picture : {filmed.picture, filmed.below}) {
       Pose truth;
-      near = near || (truth_of(config_.bundles[i], truths_[picture], truth) && !is_off(bundle.pose, truth, is_torn));
+      near = near || (truth_of(config_.bundles[i], truths_[picture], truth) &&
+                      !is_off(bundle.pose, truth, bundle.uncertainty.covariance.data(), is_torn));
     }
     if (is_judged && !near) complain(filmed, "the bundle has a wrong pose");
   }

@@ -62,9 +62,10 @@ SoakMemory memory_now() {
   memory.allocated = info.uordblks + info.hblkhd;
 #endif
 #endif
-  u64 pages = 0;
-  std::ifstream("/proc/self/statm") >> pages >> pages;
-  memory.resident = pages * static_cast<u64>(sysconf(_SC_PAGESIZE));
+  // Not what is mapped from files: drivers' libraries come in page by page as their parts are first used.
+  u64 all = 0, resident = 0, of_files = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident >> of_files;
+  memory.resident = (resident - of_files) * static_cast<u64>(sysconf(_SC_PAGESIZE));
   return memory;
 }
 

@@ -96,7 +96,7 @@ void draw_scene(SoakScenario& s, sim::Random& random) {
     const double at = random.uniform(-0.3, 0.3);
     text += fmt::format("[[lighting.glare]]\ncenter = [{:.3f}, {:.3f}]\nstrength = 0.2\n", at, -at);
   }
-  text += fmt::format("[sensor]\nblur_sigma_px = {:.3f}\n", random.uniform(0.5, 1));
+  text += fmt::format("[sensor]\nblur_fineness = 4\nblur_sigma_px = {:.3f}\n", random.uniform(0.5, 1));
   text += fmt::format("white_level = {:.1f}\n", random.uniform(120, 245));
   text += fmt::format("read_noise = {:.2f}\n", random.uniform(0.5, 3));
   s.toml = std::move(text);
