@@ -32,13 +32,16 @@ BODY
         for (u32 id = word_begin; id < word_end; id += 1u) {
           const u32 x = cracks[id];
           const int pixel = S32(x) - word_x * 32;  // 32 where the row ends black
-          u32 next = id ^ 1u;
+          // The run's other end. Not id + 1u and id - 1u where an end is told from a start: LLVM 18, as PoCL has it in
+          // Debian 13, then loads another with AVX-512 (llvm-project, issue 81872).
+          const u32 mate = id ^ 1u;
+          u32 next = mate;
           if ((id & 1u) == 0u) {
             if (y > 0) {
               const u32 after = above_begin + POPCOUNT(above_edges & bits_below(pixel + 1));
               if ((after & 1u) != 0u) {  // the pixel above is black: its run began at after - 1
                 next = id > row_begin && cracks[id - 1u] > cracks[after - 1u] ? id - 1u : after - 1u;
-              } else if (after < row_begin && cracks[after] < cracks[id + 1u]) {
+              } else if (after < row_begin && cracks[after] < cracks[mate]) {
                 next = after;
               }
             }
@@ -46,7 +49,7 @@ BODY
             const u32 after = below_begin + POPCOUNT(below_edges & bits_below(pixel));  // past the run's last pixel
             if ((after & 1u) != 0u) {
               next = id + 1u < row_end && cracks[id + 1u] < cracks[after] ? id + 1u : after;
-            } else if (after > row_end && cracks[after - 1u] > cracks[id - 1u]) {
+            } else if (after > row_end && cracks[after - 1u] > cracks[mate]) {
               next = after - 1u;
             }
           }
