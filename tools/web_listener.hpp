@@ -10,6 +10,7 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -37,7 +38,10 @@ class Workers final : public httplib::TaskQueue {
  public:
   Workers(std::atomic<u64>& refused, int most, bool give_way) : refused_(refused), most_(most), give_way_(give_way) {}
 
-  void enqueue(std::function<void()> job) override {
+  /// What enqueue returns: nothing, or from 0.13 on whether the job was taken.
+  using Taken = decltype(std::declval<httplib::TaskQueue&>().enqueue(std::declval<std::function<void()>>()));
+
+  Taken enqueue(std::function<void()> job) override {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (under_way_ < most_) {
@@ -45,13 +49,14 @@ class Workers final : public httplib::TaskQueue {
         jobs_.push_back(std::move(job));
         if (jobs_.size() > static_cast<std::size_t>(idle_)) threads_.emplace_back([this] { work(); });
         more_.notify_one();
-        return;
+        return Taken(true);
       }
     }
     ++refused_;
     is_refusing = true;
     job();
     is_refusing = false;
+    return Taken(true);  // it is done with: the library must not close the connection once more
   }
 
   void shutdown() override {
@@ -125,7 +130,23 @@ class Listener final : public httplib::Server {
     }
     Connection stream(connection);
     bool closed = false;
-    return process_request(stream, true, closed, nullptr);
+    return answer(*this, connection, stream, closed, 0);
+  }
+
+  /// As the library has it up to 0.17, and with the ends' addresses since. Templates, so that the one it has is
+  /// compiled.
+  template <class Self>
+  static auto answer(Self& self, WebConnection&, Connection& stream, bool& closed, int)
+      -> decltype(self.process_request(stream, true, closed, nullptr)) {
+    return self.process_request(stream, true, closed, nullptr);
+  }
+  template <class Self>
+  static bool answer(Self& self, WebConnection& connection, Connection& stream, bool& closed, long) {
+    std::string remote, local;
+    int remote_port = 0, local_port = 0;
+    connection.name_end(true, remote, remote_port);
+    connection.name_end(false, local, local_port);
+    return self.process_request(stream, remote, remote_port, local, local_port, true, closed, nullptr);
   }
 
   const std::size_t most_;
