@@ -1,3 +1,4 @@
+# shellcheck shell=sh
 # Networks of a test's own, in which port 3956 is free whatever else is tested on the machine: for scripts to source.
 
 # Runs the script again, with its arguments, in a network of its own whose loopback is up. Exits with 77 where the
