@@ -67,7 +67,8 @@ GrayImage marker_wall(int count) {
     sim::SceneMarker marker;
     marker.id = i;
     marker.size_m = 0.6 * std::min(step_x, step_y);
-    marker.pose.t = {(i % kSide - 4.5) * step_x, (i / kSide - 4.5) * step_y, 1};
+    const int column = i % kSide, row = i / kSide;
+    marker.pose.t = {(column - 4.5) * step_x, (row - 4.5) * step_y, 1};
     scene.markers.push_back(marker);
   }
   return sim::Renderer(scene.camera).render(scene);
