@@ -22,6 +22,9 @@ using test::ScratchFolder;
 using test::text_of;
 using testing::HasSubstr;
 
+const std::string kTrack = "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml";
+const std::string kPort = BERTH_SOURCE_DIR "/targets/port.yaml";
+
 TEST(Run, LogsEveryFrameOfAFolder) {
   const ScratchFolder folder;
   for (const char* name : {"1.png", "2.png", "3.png"}) std::filesystem::copy_file(kImage, folder / name);
@@ -41,8 +44,8 @@ TEST(Run, LogsEveryFrameOfAFolder) {
 
 TEST(Run, FollowsMarkersInWindowsAndSaysWhere) {
   const ScratchFolder folder;
-  const CommandRun run = run_berth({"run", "--source", "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml", "--max-frames",
-                                    "4", "--json", folder / "log", "--track", "--full-every", "2"});
+  const CommandRun run = run_berth(
+      {"run", "--source", kTrack, "--max-frames", "4", "--json", folder / "log", "--track", "--full-every", "2"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   const std::vector<json> log = CommandRun::json_lines(text_of(folder / "log"));
   ASSERT_EQ(log.size(), 4u);
@@ -64,8 +67,8 @@ TEST(Run, FiltersAndTracksByTheCameraThatFits) {
   write_camera_info(folder / "twice.yaml", paper_camera(1280, 960));
   write_camera_info(folder / "fitting.yaml", resized_camera(paper_camera(1280, 960), 640, 480));
   const auto log_with = [&](std::vector<std::string> options) {
-    options.insert(options.begin(), {"run", "--source", "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml", "--max-frames",
-                                     "6", "--json", folder / "log", "--track", "--filter", "--camera"});
+    options.insert(options.begin(), {"run", "--source", kTrack, "--max-frames", "6", "--json", folder / "log",
+                                     "--track", "--filter", "--camera"});
     const CommandRun run = run_berth(options);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return CommandRun::json_lines(text_of(folder / "log"));
@@ -84,8 +87,7 @@ TEST(Run, FiltersAndTracksByTheCameraThatFits) {
 }
 
 TEST(Run, RefusesToTrackWhatWindowsDoNotShow) {
-  const CommandRun run = run_berth(
-      {"run", "--source", "sim:not_there.toml", "--track", "--target", BERTH_SOURCE_DIR "/targets/port.yaml"});
+  const CommandRun run = run_berth({"run", "--source", "sim:not_there.toml", "--track", "--target", kPort});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, AllOf(HasSubstr("--track"), HasSubstr("--target"), HasSubstr("leave one of the two out")));
   const CommandRun alone = run_berth({"run", "--source", "sim:not_there.toml", "--full-every", "3"});
