@@ -36,6 +36,8 @@ using test::text_of;
 using testing::HasSubstr;
 using testing::Not;
 
+const std::string kTrack = "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml";
+
 TEST(FrameRecord, NamesTheFirstFieldThatDiffers) {
   const Json was = {{"frame", 1}, {"a", {{"b", {1.5, 2.5, -0.0}}}}, {"stages_us", {{"x", 1}}}};
   Json is = was;
@@ -113,9 +115,8 @@ TEST(Record, AtACamerasPaceToo) {
   EXPECT_GT(records[0]["laps_us"]["latency"], 0);
 
   // Windows that went by results of frames before the last one.
-  const CommandRun tracked =
-      run_berth({"run", "--source", "sim:" BERTH_SOURCE_DIR "/scenarios/track.toml", "--max-frames", "20", "--record",
-                 folder / "b.mcap", "--fps", "50", "--track", "--filter"});
+  const CommandRun tracked = run_berth({"run", "--source", kTrack, "--max-frames", "20", "--record", folder / "b.mcap",
+                                        "--fps", "50", "--track", "--filter"});
   ASSERT_EQ(tracked.exit_code, 0) << tracked.err;
   EXPECT_THAT(tracked.out, HasSubstr("in windows"));
   const CommandRun again = run_berth({"replay", folder / "b.mcap"});
