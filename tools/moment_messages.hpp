@@ -14,6 +14,9 @@ struct VehicleFrames {
   std::string robot, dock;
 };
 
+/// Of the moment's time, which both stations' frames are of.
+inline const char* clock_of(const StationMoment& moment) { return moment.frames[moment.came[0] ? 0 : 1].stamp.clock; }
+
 /// Whether there is a pose to drive by: one on which the stations disagree is none.
 inline bool is_agreed(const FusedPose& fused) { return fused.has_pose && !fused.disagree; }
 

@@ -29,8 +29,7 @@ class MomentPublisher final : public MomentObserver {
 
   void observe(const ObservedMoment& observed) override {
     const StationMoment& moment = observed.moment;
-    const char* clock = moment.frames[moment.came[0] ? 0 : 1].stamp.clock;
-    const std::int64_t stamp_ns = ros_stamp_ns(plan_, clock, moment.time_ns);
+    const std::int64_t stamp_ns = ros_stamp_ns(plan_, clock_of(moment), moment.time_ns);
     const bool taken = worker_->offer([&](Item& item) { item = {stamp_ns, moment, observed.fused, observed.counts}; });
     if (!taken) ++unpublished_;
   }

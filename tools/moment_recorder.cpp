@@ -10,6 +10,7 @@
 
 #include "moment_record.hpp"
 #include "recording_file.hpp"
+#include "unix_time.hpp"
 
 namespace berth::cli {
 namespace {
@@ -19,11 +20,6 @@ constexpr std::size_t kSlots = 256;
 /// Chunks end by their age even when no moment comes.
 constexpr std::chrono::milliseconds kPatience{200};
 constexpr std::chrono::seconds kHealthEvery{1};
-
-std::int64_t wall_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 
@@ -56,7 +52,7 @@ MomentRecorder::~MomentRecorder() {
 
 void MomentRecorder::begin() {
   file_ = std::make_unique<MessageFile>(recording_.file);
-  file_->begin(wall_ns());
+  file_->begin(unix_ns());
   file_->add(mcap::Metadata{kStationsMetadata, recording_.settings});
   std::ifstream stations(recording_.stations_file, std::ios::binary);
   file_->add(
@@ -73,7 +69,7 @@ void MomentRecorder::begin() {
 void MomentRecorder::observe(const ObservedMoment& observed) {
   ++observed_;
   const auto offer = [&] {
-    return worker_->offer([&](Item& item) { item = {wall_ns(), observed.moment, observed.fused, observed.counts}; });
+    return worker_->offer([&](Item& item) { item = {unix_ns(), observed.moment, observed.fused, observed.counts}; });
   };
   while (!offer()) {
     if (observed.is_live) {
@@ -89,8 +85,7 @@ void MomentRecorder::observe(const ObservedMoment& observed) {
 
 void MomentRecorder::write(const Item& item) {
   const FusedPose& fused = item.fused;
-  const char* clock = item.moment.frames[item.moment.came[0] ? 0 : 1].stamp.clock;
-  const std::int64_t stamp_ns = file_->stamp_of(clock, fused.time_ns, item.came_ns);
+  const std::int64_t stamp_ns = file_->stamp_of(clock_of(item.moment), fused.time_ns, item.came_ns);
   file_->set_times(item.came_ns, stamp_ns);
   health_.add(item.moment, fused, item.counts);
   write_health(item.came_ns);

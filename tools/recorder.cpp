@@ -10,6 +10,7 @@
 #include "berth/error.hpp"
 #include "camera/bad_input.hpp"
 #include "pipeline/thread_setup.hpp"
+#include "unix_time.hpp"
 
 namespace berth::cli {
 namespace {
@@ -17,11 +18,6 @@ namespace {
 /// How long the writer's thread sleeps at most: chunks end by their age even when no frame comes.
 constexpr std::chrono::milliseconds kPatience{200};
 constexpr int kMostQueued = 100000;
-
-std::int64_t wall_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 const RecordOptions& checked(const RecordOptions& options) {
   if (options.queue < 1 || options.queue > kMostQueued) {
@@ -46,7 +42,7 @@ Recorder::~Recorder() { stop(); }
 void Recorder::begin(const ObservedStream& stream) {
   queue_ = std::make_unique<FrameQueue>(static_cast<std::size_t>(options_.queue),
                                         options_.pictures != RecordPictures::none, stream.width, stream.height);
-  file_.begin(setup_, stream.config, stream.backend, camera_ ? camera_ : stream.config.camera, wall_ns());
+  file_.begin(setup_, stream.config, stream.backend, camera_ ? camera_ : stream.config.camera, unix_ns());
   writer_ = std::thread([this] {
     name_thread("berth-recorder");
     work();
@@ -54,7 +50,7 @@ void Recorder::begin(const ObservedStream& stream) {
 }
 
 void Recorder::observe(const ObservedFrame& frame) {
-  queue_->push(frame, wall_ns(), !paced_);
+  queue_->push(frame, unix_ns(), !paced_);
   if (!failed_ || told_) return;
   told_ = true;
   console_.complain(failure_ + "; the run goes on, nothing more is recorded");

@@ -10,11 +10,6 @@
 
 namespace berth::cli {
 
-std::int64_t unix_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 std::int64_t ros_stamp_ns(const RosPlan& plan, std::string_view clock, std::int64_t time_ns) {
   if (plan.source_time) return time_ns;
   // Other clocks say nothing of when that was.

@@ -11,11 +11,10 @@
 #include "ros2/dds.hpp"
 #include "ros2/messages.hpp"
 #include "ros_options.hpp"
+#include "unix_time.hpp"
 
 namespace berth::cli {
 
-/// Nanoseconds since 1970, now.
-std::int64_t unix_ns();
 /// A source's time as messages are stamped: as it is with RosPlan::source_time, else as system time where its clock is
 /// the system's monotonic one, else now.
 std::int64_t ros_stamp_ns(const RosPlan& plan, std::string_view clock, std::int64_t time_ns);

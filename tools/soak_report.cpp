@@ -15,34 +15,6 @@ namespace {
 
 constexpr std::size_t kViolationsKept = 100;
 
-using Count = u64 SoakTally::*;
-constexpr std::array<std::pair<const char*, Count>, 15> kCounts = {{
-    {"scenarios", &SoakTally::scenarios},
-    {"frames", &SoakTally::frames},
-    {"compared", &SoakTally::compared},
-    {"dropped", &SoakTally::dropped},
-    {"poses", &SoakTally::poses},
-    {"devices_lost", &SoakTally::devices_lost},
-    {"devices_hung", &SoakTally::devices_hung},
-    {"failed_over", &SoakTally::failed_over},
-    {"returned", &SoakTally::returned},
-    {"devices_stalled", &SoakTally::devices_stalled},
-    {"threads_stopped", &SoakTally::threads_stopped},
-    {"recordings", &SoakTally::recordings},
-    {"replayed", &SoakTally::replayed},
-    {"disks_full", &SoakTally::disks_full},
-    {"recovered", &SoakTally::recovered},
-}};
-using CameraCount = u64 SourceHealth::*;
-constexpr std::array<std::pair<const char*, CameraCount>, 6> kCameraCounts = {{
-    {"lost", &SourceHealth::lost},
-    {"incomplete", &SourceHealth::incomplete},
-    {"skipped", &SourceHealth::skipped},
-    {"repeated", &SourceHealth::repeated},
-    {"misdated", &SourceHealth::misdated},
-    {"reopened", &SourceHealth::reopened},
-}};
-
 double megabytes(u64 bytes) { return static_cast<double>(bytes) / 1e6; }
 
 void raise(SoakMemory& most, const SoakMemory& memory) {
@@ -116,8 +88,8 @@ Json to_json(const SoakReport& report) {
     json["violations"].push_back(row);
   }
   const SoakTally& tally = report.tally;
-  for (const auto& [name, count] : kCounts) json["counts"][name] = tally.*count;
-  for (const auto& [name, count] : kCameraCounts) json["camera"][name] = tally.camera.*count;
+  for (const auto& [name, count] : kSoakCounts) json["counts"][name] = tally.*count;
+  for (const auto& [name, count] : kSourceCounts) json["camera"][name] = tally.camera.*count;
   for (std::size_t i = 1; i < kCameraFaults; ++i) {
     json["camera_faults"][name_of(static_cast<CameraFault>(i))] = tally.camera_faults[i];
   }
@@ -152,8 +124,8 @@ SoakReport read_soak_report(const std::string& file, u64 seed) {
       report.violations.push_back(violation);
     }
     SoakTally& tally = report.tally;
-    for (const auto& [name, count] : kCounts) tally.*count = json.at("counts").at(name);
-    for (const auto& [name, count] : kCameraCounts) tally.camera.*count = json.at("camera").at(name);
+    for (const auto& [name, count] : kSoakCounts) tally.*count = json.at("counts").at(name);
+    for (const auto& [name, count] : kSourceCounts) tally.camera.*count = json.at("camera").at(name);
     for (std::size_t i = 1; i < kCameraFaults; ++i) {
       tally.camera_faults[i] = json.at("camera_faults").at(name_of(static_cast<CameraFault>(i)));
     }

@@ -308,32 +308,6 @@ class ScenarioRun {
 
 }  // namespace
 
-void SoakTally::add(const SoakTally& other) {
-  scenarios += other.scenarios;
-  frames += other.frames;
-  compared += other.compared;
-  dropped += other.dropped;
-  poses += other.poses;
-  for (std::size_t i = 0; i < kCameraFaults; ++i) camera_faults[i] += other.camera_faults[i];
-  camera.lost += other.camera.lost;
-  camera.incomplete += other.camera.incomplete;
-  camera.skipped += other.camera.skipped;
-  camera.repeated += other.camera.repeated;
-  camera.misdated += other.camera.misdated;
-  camera.reopened += other.camera.reopened;
-  devices_lost += other.devices_lost;
-  devices_hung += other.devices_hung;
-  failed_over += other.failed_over;
-  returned += other.returned;
-  devices_stalled += other.devices_stalled;
-  threads_stopped += other.threads_stopped;
-  recordings += other.recordings;
-  replayed += other.replayed;
-  disks_full += other.disks_full;
-  recovered += other.recovered;
-  for (const auto& [kind, count] : other.kinds) kinds[kind] += count;
-}
-
 SoakOutcome run_scenario(const SoakScenario& scenario, const SoakBackends& backends, const AlterTruth& alter) {
   return ScenarioRun(scenario, backends).run(alter);
 }

@@ -10,26 +10,9 @@
 #include "soak_backends.hpp"
 #include "soak_check.hpp"
 #include "soak_scenario.hpp"
+#include "soak_tally.hpp"
 
 namespace berth::cli {
-
-/// What a scenario, or all so far, came to.
-struct SoakTally {
-  u64 scenarios = 0;
-  /// With a result; with a result that was compared with a plain run's; that the pipeline dropped for newer ones.
-  u64 frames = 0, compared = 0, dropped = 0;
-  u64 poses = 0;
-  /// Camera faults that began, by kind; and what the camera's source counted.
-  std::array<u64, kCameraFaults> camera_faults = {};
-  SourceHealth camera;
-  u64 devices_lost = 0, devices_hung = 0, failed_over = 0, returned = 0, devices_stalled = 0;
-  u64 threads_stopped = 0;
-  u64 recordings = 0, replayed = 0, disks_full = 0, recovered = 0;
-  /// Scenarios of each configuration that there is: "tracked", "on simd", …
-  std::map<std::string, u64> kinds;
-
-  void add(const SoakTally& other);
-};
 
 /// One scenario's.
 struct SoakOutcome {

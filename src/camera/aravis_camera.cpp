@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <optional>
 #include <thread>
 
@@ -16,15 +15,10 @@
 #include "camera/decoders.hpp"
 #include "camera/gige_probe.hpp"
 #include "monotonic.hpp"
+#include "unix_time.hpp"
 
 namespace berth {
 namespace {
-
-std::int64_t unix_ns() {
-  timespec now = {};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 class AravisCamera final : public LiveCamera {
  public:
