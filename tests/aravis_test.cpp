@@ -73,7 +73,7 @@ class Aravis : public testing::Test {
 TEST(AravisOptions, ReadsEveryKey) {
   const AravisOptions options = parse_aravis(
       "GV77,width=640,height=480,x=8,y=4,fps=59.94,format=Mono12p,exposure_us=2000,gain=1.5,packet_size=8000,buffers=3,"
-      "retention_ms=6.5,resend=off,time=ptp,watchdog_ms=250");
+      "retention_ms=6.5,resend=off,packet_socket=on,time=ptp,watchdog_ms=250");
   EXPECT_EQ(options.name, "GV77");
   EXPECT_EQ(options.width, 640);
   EXPECT_EQ(options.height, 480);
@@ -87,6 +87,8 @@ TEST(AravisOptions, ReadsEveryKey) {
   EXPECT_EQ(options.buffers, 3);
   EXPECT_EQ(options.retention_ms, 6.5);
   EXPECT_FALSE(options.resend);
+  EXPECT_TRUE(options.packet_socket);
+  EXPECT_FALSE(parse_aravis("GV77").packet_socket);
   EXPECT_EQ(options.time, AravisOptions::Time::ptp);
   EXPECT_EQ(options.watchdog_ms, 250);
   EXPECT_FALSE(options.chunk_time);

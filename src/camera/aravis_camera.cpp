@@ -260,7 +260,7 @@ class AravisCamera final : public LiveCamera {
         check(failure, "packet_size");
       }
       // A packet socket sees nothing of what goes over the loopback interface.
-      if (g_inet_address_get_is_loopback(address()) != 0) {
+      if (!options_.packet_socket || g_inet_address_get_is_loopback(address()) != 0) {
         arv_gv_device_set_stream_options(ARV_GV_DEVICE(device), ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
       }
     }

@@ -32,6 +32,8 @@ struct AravisOptions {
   double retention_ms = 0;
   /// Missing packets are asked for again.
   bool resend = true;
+  /// Over Ethernet, packets are taken from a packet socket's ring (CAP_NET_RAW) in place of an ordinary socket.
+  bool packet_socket = false;
   /// What a frame's time is on.
   enum class Time {
     /// When its first packet came here.

@@ -9,8 +9,8 @@ namespace berth {
 namespace {
 
 constexpr const char* kKeys =
-    "width, height, x, y, fps, format, exposure_us, gain, trigger, packet_size, buffers, retention_ms, resend, time, "
-    "timestamp, watchdog_ms, repeats";
+    "width, height, x, y, fps, format, exposure_us, gain, trigger, packet_size, buffers, retention_ms, resend, "
+    "packet_socket, time, timestamp, watchdog_ms, repeats";
 
 bool set_image(AravisOptions& options, const SourceKeys& keys, const std::string& key, const std::string& value) {
   if (key == "width") {
@@ -56,6 +56,8 @@ bool set_transport(AravisOptions& options, const SourceKeys& keys, const std::st
     options.retention_ms = keys.real(key, value, 0.1, 1000);
   } else if (key == "resend") {
     options.resend = keys.on_or_off(key, value);
+  } else if (key == "packet_socket") {
+    options.packet_socket = keys.on_or_off(key, value);
   } else if (key == "time") {
     if (value != "host" && value != "camera" && value != "ptp") keys.refuse(key, value, "give host, camera or ptp");
     options.time = value == "host"     ? AravisOptions::Time::host

@@ -211,7 +211,7 @@ def fly(given, folder):
     subscriber = Subscriber()
     subscriber.start()
     source = (f"aravis:{ADDRESS},width=640,height=480,fps={FPS},packet_size=9000,exposure_us={EXPOSURE_NS // 1000},"
-              f"resend=off,time=camera,buffers=32,watchdog_ms=500")
+              f"resend=off,time=camera,buffers=32,watchdog_ms=500{given.keys}")
     run = Run([given.berth, "run", "--source", source, "--stream", "--slots=8", "--json", log, *engine, "--ros",
                f"--ros-domain={DOMAIN}", "--ros-source-time", "--ros-wait=30", "--ros-dock=tag36h11:0",
                "--ros-qos=pose=4000", *OTHERS_OFF, *given.also])
@@ -303,6 +303,7 @@ def main():
     parser.add_argument("--shown", type=int, default=4, help="images that it shows in turn")
     parser.add_argument("--lost", type=float, default=0, help="share of the packets")
     parser.add_argument("--also", action="append", default=[], help="an option for berth run")
+    parser.add_argument("--keys", default="", help="more of the camera's keys, e.g. ,packet_socket=on")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         cameras, output, lines, summary, expected, poses, memory_kb, given_up = fly(given, folder)
