@@ -224,16 +224,16 @@ TEST(KnownAnswerOfWindows, IsAskedOnEveryPlanInTurn) {
   HealthConfig always;
   always.known_answer_every_ns = 1;
   const std::vector<FrameResult> wanted = expected(posing());
-  // Recorded after the whole frame's; one in each of the two sides' turns.
-  for (const int plan : {1, 3}) {
+  // Recorded after the whole frame's, two for each window.
+  for (const int plan : {1, 2, 3, 4, 5, 6}) {
     SCOPED_TRACE(plan);
-    test::Fault fault = wrong_at(MarkerPlan::of_window(*simd, plan == 1 ? 128 : 96, config), 1);
+    test::Fault fault = wrong_at(MarkerPlan::of_window(*simd, plan <= 2 ? 128 : 96, config), 1);
     fault.flip_bit = 12;  // more than there is room for: of two windows the fuller one is told of
     fault.flip_plan = plan;
     const auto faulty = test::make_faulty_backend(*simd, fault);
     FailoverDetector detector({faulty.get(), cpu.get()}, kWidth, kHeight, config, always);
     EXPECT_EQ(detector.health().mode, HealthMode::nominal);
-    for (u64 i = 0; i < 2; ++i) expect_same(detector.detect(picture(i), stamped(i)), wanted[i]);
+    for (u64 i = 0; i < 4; ++i) expect_same(detector.detect(picture(i), stamped(i)), wanted[i]);
     EXPECT_EQ(detector.health().mode, HealthMode::fallback);
     EXPECT_STREQ(detector.health().reason, "a wrong known answer");
   }

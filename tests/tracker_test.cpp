@@ -129,6 +129,41 @@ TEST(Tracker, AnApproachIsFollowedInWindowsWithTheWholeFramesBits) {
   EXPECT_EQ(tracker.counts().by_reason[static_cast<std::size_t>(SearchReason::held)], 8u);
 }
 
+TEST(Tracker, WhatTheWholeImagesSearchReadsIsLookedForByItAlone) {
+  Follower follower;
+  const GrayImage sharp = picture({{3, 0, 0, 0.8}});
+  GrayImage faint = sharp;  // too little contrast for the whole image's search
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) faint.view().at(x, y) = static_cast<u8>(120 + sharp.view().at(x, y) / 16);
+  }
+  int i = 0;
+  const auto look = [&](const GrayImage& image) -> const TrackedFrame& { return follower.look(image, stamp(i++)); };
+  for (int k = 0; k < 8; ++k) {
+    const TrackedFrame& tracked = look(sharp);
+    EXPECT_EQ(tracked.why, k == 0 ? SearchReason::none_held : SearchReason::held);
+    for (const SearchWindow& window : tracked.windows) EXPECT_FALSE(window.full_resolution_only) << i;
+  }
+  {
+    const TrackedFrame& tracked = look(sharp);
+    EXPECT_EQ(tracked.why, SearchReason::held);
+    ASSERT_EQ(tracked.windows.size(), 1u);
+    EXPECT_TRUE(tracked.windows[0].full_resolution_only);
+  }
+  {
+    const TrackedFrame& tracked = look(faint);
+    EXPECT_EQ(tracked.why, SearchReason::lost);
+    EXPECT_TRUE(tracked.whole);
+    EXPECT_EQ(ids_of(tracked), std::vector<int>{3});
+  }
+  for (const bool is_faint : {true, false, true}) {
+    const TrackedFrame& tracked = look(is_faint ? faint : sharp);
+    EXPECT_EQ(tracked.why, SearchReason::held);
+    ASSERT_EQ(tracked.windows.size(), 1u);
+    EXPECT_FALSE(tracked.windows[0].full_resolution_only);
+    EXPECT_EQ(tracked.result->detections.at(0).search, is_faint ? 1 : 0);
+  }
+}
+
 TEST(Tracker, LossIsSearchedWholeAtOnceAndTheMarkerFoundWhenItIsBack) {
   Follower follower;
   const auto at = [](int i) { return picture({{3, 0.002 * i, 0.01, 0.8}}); };

@@ -90,6 +90,9 @@ struct Detection {
   int hamming = 0;
   /// Mean distance of the bits from their threshold, grey levels: how sure the decoding is.
   double margin = 0;
+  /// Which of the plan's searches found it: 0 the whole image's, 1 the halved one's, 2 the halved one's for the darkest
+  /// (docs/marker-pipeline.md).
+  int search = 0;
   std::array<std::array<double, 2>, 4> corners = {};
   /// Where the diagonals meet, px: the image of the square's centre.
   std::array<double, 2> center = {};

@@ -133,7 +133,7 @@ struct HostFinish::Impl {
                                        [](const DiscPose& target) { return target.has_pose; });
     result.status = result.detections.empty() && !has_discs ? FrameStatus::no_target : FrameStatus::ok;
     for (const SearchArea* area : frame.areas()) {
-      for (std::size_t i = 0; i < area->searches.size(); ++i) {
+      for (std::size_t i = 0; i < area->searched(); ++i) {
         area->searches[i].note_capacities(&result.capacities[3 * i]);
       }
     }
@@ -157,23 +157,24 @@ struct HostFinish::Impl {
   void decode(const DeviceFrame& frame, const SearchArea& area, FrameResult& result) {
     found.clear();
     refused.clear();
-    for (const SearchResult& search : area.searches) decode(frame.submitted(), search, area.place, result);
+    for (std::size_t i = 0; i < area.searched(); ++i) decode(frame.submitted(), area, i, result);
     resolve_duplicates(found);
     for (const Detection& detection : found) {
-      const bool is_frames_own = frame.is_whole(area) || is_well_inside(box_of(detection.corners), area.place);
-      if (is_frames_own) result.detections.push_back(detection);
+      if (frame.is_whole(area) || is_frames_own(detection, area.place)) result.detections.push_back(detection);
     }
   }
 
-  void decode(View2D<const u8> image, const SearchResult& search, const SearchWindow& place, FrameResult& result) {
+  void decode(View2D<const u8> image, const SearchArea& area, std::size_t index, FrameResult& result) {
+    const SearchResult& search = area.searches[index];
     QuadCandidate candidate;
     Detection detection;
     for (int i = 0; i < search.slots(); ++i) {
       bool has_corners = false;
-      if (!search.quad(i, place.x, place.y, candidate, has_corners)) continue;
+      if (!search.quad(i, area.place.x, area.place.y, candidate, has_corners)) continue;
       ++result.quads;
       if (!has_corners || is_cut_off(candidate, image.width, image.height) || is_known(candidate)) continue;
       if (decoder.decode(image, candidate, detection)) {
+        detection.search = static_cast<int>(index);
         if (config.corner_deviation_px > 0) {
           detection.corner_covariance_px2 = independent_corners(config.corner_deviation_px);
         }
@@ -243,8 +244,8 @@ struct HostFinish::Impl {
     for (std::size_t k = 0; k < frame.areas().size(); ++k) {
       MarkerPlan& plan = frame.areas()[k]->plan;
       const std::string prefix = frame.is_whole(*frame.areas()[k]) ? "" : "window" + std::to_string(k) + "_";
-      StageReader reader(plan, frame.stream());
-      for (std::size_t i = 0; i < plan.stages().size(); ++i) {
+      StageReader reader(plan, frame.stream(), frame.areas()[k]->place.full_resolution_only);
+      for (std::size_t i = 0; i < reader.stages(); ++i) {
         const std::vector<u32>& words = reader.read(i);
         result.digests.push_back({prefix + plan.stages()[i].name, digest_words(words.data(), words.size())});
       }
@@ -357,8 +358,9 @@ std::optional<StageDifference> first_difference(Detector& first, Detector& secon
   DeviceFrame& one = first.impl_->device;
   DeviceFrame& two = second.impl_->device;
   for (std::size_t i = 0; i < one.areas().size(); ++i) {
-    StageReader a(one.areas()[i]->plan, one.stream());
-    StageReader b(two.areas()[i]->plan, two.stream());
+    const bool is_first_alone = one.areas()[i]->place.full_resolution_only;
+    StageReader a(one.areas()[i]->plan, one.stream(), is_first_alone);
+    StageReader b(two.areas()[i]->plan, two.stream(), is_first_alone);
     if (auto difference = first_difference(a, b)) return difference;
   }
   return std::nullopt;

@@ -102,7 +102,9 @@ void DeviceFrame::submit_windows(View2D<const u8> frame, const std::vector<Searc
     areas_.push_back(&area);
   }
   submitted_ = frame;
-  levels_->measure(frame);
+  const bool is_halved_searched = std::any_of(windows.begin(), windows.end(),
+                                              [](const SearchWindow& window) { return !window.full_resolution_only; });
+  levels_->measure(frame, is_halved_searched ? 2 : 1);
   for (SearchArea* area : areas_) area->enqueue_window(frame, *levels_, *stream_);
   end_submit();
 }
@@ -116,7 +118,10 @@ bool DeviceFrame::finish() {
 /// Runs the plans on whatever the buffers hold.
 bool DeviceFrame::warm_up() {
   stream_->replay(whole_.plan.plan());
-  for (const auto& window : windows_) stream_->replay(window->plan.plan());
+  for (const auto& window : windows_) {
+    stream_->replay(window->plan.full_resolution_plan());
+    stream_->replay(window->plan.plan());
+  }
   return stream_->finish();
 }
 

@@ -98,9 +98,10 @@ void FrameLevels::collect(View2D<const u8> image, const MarkerGeometry& geometry
   for (std::size_t i = 0; i < ranges_.size(); ++i) ranges_[i] = static_cast<u8>(maxima_[i] - minima_[i]);
 }
 
-void FrameLevels::measure(View2D<const u8> image) {
+void FrameLevels::measure(View2D<const u8> image, std::size_t scales) {
   collect(image, whole_, 1);
   levels_[0] = {0, 0, 0, contrast_of(kNormalizeWhole, minima_, maxima_, ranges_)};
+  if (scales < 2) return;
   collect(image, half_, 2);
   levels_[1] = {0, 0, 0, contrast_of(kNormalizeHalf, minima_, maxima_, ranges_)};
 }

@@ -18,7 +18,8 @@ class FrameLevels {
   /// The geometries of the whole and the halved image; `gains` as pack_gains made them, or empty.
   FrameLevels(const MarkerGeometry& whole, const MarkerGeometry& half, std::vector<u32> gains);
 
-  void measure(View2D<const u8> image);
+  /// Of the whole image, and where `scales` is 2 of the halved one too.
+  void measure(View2D<const u8> image, std::size_t scales = 2);
   /// As normalize writes them for the whole (0) or the halved image (1), with the asked contrast alone: the rest are 0,
   /// and no operation reads them.
   const Words& levels(std::size_t scale) const { return levels_[scale]; }

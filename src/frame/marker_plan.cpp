@@ -113,6 +113,8 @@ MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorCo
   frame_ = buffers_.make(whole.frame_bytes() / 4);
   Buffer* pixels = config.flat_field.empty() ? frame_ : add_flat_field(config.flat_field);
   add_search(0, kMiddle, pixels, add_tiles(0, pixels, kNormalizeWhole), pixels, config);
+  if (is_window_) full_resolution_plan_ = backend_.record(steps_);
+  full_resolution_stages_ = stages_.size();
   Buffer* half_pixels = add_halve(pixels);
   const Tiles half_tiles = add_tiles(1, half_pixels, kNormalizeHalf);
   add_search(1, kMiddle, half_pixels, half_tiles, pixels, config);
@@ -139,6 +141,7 @@ Buffer* MarkerPlan::add_flat_field(const std::vector<float>& gains) {
 
 void MarkerPlan::list_constants(std::vector<ConstantMemory>& to) const {
   plan_->list_constants(to);
+  if (full_resolution_plan_) full_resolution_plan_->list_constants(to);
   if (flat_field_ != nullptr && flat_field_->host() != nullptr) {
     to.push_back({"flat field", flat_field_->host(), flat_field_->bytes()});
   }

@@ -89,6 +89,9 @@ class MarkerPlan {
   const MarkerGeometry& geometry() const { return searches_.front().geometry; }
   const std::vector<MarkerSearch>& searches() const { return searches_; }
   Plan& plan() { return *plan_; }
+  /// A window's plan up to the whole image's search, and how many stages it has.
+  Plan& full_resolution_plan() { return *full_resolution_plan_; }
+  std::size_t full_resolution_stages() const { return full_resolution_stages_; }
   const std::vector<Step>& steps() const { return steps_; }
 
   /// Where the padded frame goes: u8[padded_height, padded_width].
@@ -138,6 +141,8 @@ class MarkerPlan {
   std::vector<Step> steps_;
   std::vector<Stage> stages_;
   std::unique_ptr<Plan> plan_;
+  std::unique_ptr<Plan> full_resolution_plan_;  // of a window
+  std::size_t full_resolution_stages_ = 0;
 };
 
 /// Gains as flat_field reads them: two u16 q12 a word, padded like the frame. Throws Error on a wrong number of them or

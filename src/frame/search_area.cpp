@@ -67,13 +67,13 @@ SearchArea::SearchArea(MarkerPlan&& made, bool with_points) : plan(std::move(mad
 
 void SearchArea::enqueue(Stream& stream) {
   if (is_staged()) stream.upload(plan.frame(), staging_.data(), staging_.size());
-  stream.replay(plan.plan());
-  for (SearchResult& search : searches) search.download(stream);
+  stream.replay(place.full_resolution_only ? plan.full_resolution_plan() : plan.plan());
+  for (std::size_t i = 0; i < searched(); ++i) searches[i].download(stream);
 }
 
 void SearchArea::enqueue_window(View2D<const u8> frame, const FrameLevels& levels, Stream& stream) {
   pad_frame({frame.row(place.y) + place.x, place.side, place.side, frame.stride}, plan.geometry(), pixels());
-  for (std::size_t scale = 0; scale < 2; ++scale) {
+  for (std::size_t scale = 0; scale < (place.full_resolution_only ? 1 : 2); ++scale) {
     stream.upload(plan.levels(scale), levels.levels(scale).data(), sizeof(FrameLevels::Words));
   }
   if (plan.gains() != nullptr) enqueue_gains(levels, stream);

@@ -52,6 +52,8 @@ class SearchArea {
   bool is_staged() const { return !staging_.empty(); }
   /// The padded pixels: u8[padded_height, padded_width].
   u8* pixels() { return staging_.empty() ? static_cast<u8*>(plan.frame().host()) : staging_.data(); }
+  /// How many of the searches are made of what lies in `place`.
+  std::size_t searched() const { return place.full_resolution_only ? 1 : searches.size(); }
   /// Enqueues what was written to pixels().
   void enqueue(Stream& stream);
   /// Enqueues a window at `place` of the frame, with its levels.

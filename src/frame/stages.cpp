@@ -4,7 +4,10 @@
 
 namespace berth {
 
-StageReader::StageReader(MarkerPlan& plan, Stream& stream) : plan_(plan), stream_(stream) {
+StageReader::StageReader(MarkerPlan& plan, Stream& stream, bool full_resolution_only)
+    : plan_(plan),
+      stream_(stream),
+      stages_(full_resolution_only ? plan.full_resolution_stages() : plan.stages().size()) {
   for (const MarkerSearch& search : plan.searches()) {
     searches_.emplace_back();
     fetch(*search.contours, searches_.back().contours);
@@ -57,7 +60,7 @@ const std::vector<u32>& StageReader::read(std::size_t index) {
 
 std::optional<StageDifference> first_difference(StageReader& first, StageReader& second) {
   const std::vector<Stage>& stages = first.plan().stages();
-  for (std::size_t i = 0; i < stages.size(); ++i) {
+  for (std::size_t i = 0; i < first.stages(); ++i) {
     const std::vector<u32>& a = first.read(i);
     const std::vector<u32>& b = second.read(i);
     if (a == b) continue;

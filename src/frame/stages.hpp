@@ -11,8 +11,11 @@ namespace berth {
 /// What a frame wrote, stage by stage, copied off the device: for digests and comparisons, not for the frame path.
 class StageReader {
  public:
-  /// The plan's last frame must be done.
-  StageReader(MarkerPlan& plan, Stream& stream);
+  /// The plan's last frame must be done; `full_resolution_only`: of full_resolution_plan().
+  StageReader(MarkerPlan& plan, Stream& stream, bool full_resolution_only = false);
+
+  /// How many stages the frame has been through.
+  std::size_t stages() const { return stages_; }
 
   /// The words of stage `index` that belong to the frame: lists end where they end, slots without a quadrilateral are
   /// reduced to their flags.
@@ -25,6 +28,7 @@ class StageReader {
 
   MarkerPlan& plan_;
   Stream& stream_;
+  std::size_t stages_;
   struct Search {
     std::vector<u32> contours;
     std::vector<u32> quads;

@@ -44,4 +44,11 @@ inline bool is_well_inside(const Box& box, const SearchWindow& window) {
          box.right + reach <= window.x + window.side - 1 && box.bottom + reach <= window.y + window.side - 1;
 }
 
+/// Whether the frame says the same of a marker that was found in this window.
+inline bool is_frames_own(const Detection& detection, const SearchWindow& window) {
+  // A later search may read with fewer wrong bits what this one has some in.
+  const bool is_final = !window.full_resolution_only || detection.hamming == 0;
+  return is_final && is_well_inside(box_of(detection.corners), window);
+}
+
 }  // namespace berth

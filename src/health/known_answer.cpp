@@ -121,6 +121,8 @@ KnownAnswer::KnownAnswer(int width, int height, const DetectorConfig& config)
   Detector detector(*reference, width, height, config);
   parts_.emplace_back();
   for (std::vector<SearchWindow>& windows : window_parts(width, height, config.window_sides)) {
+    parts_.push_back({windows, 0});
+    for (SearchWindow& window : windows) window.full_resolution_only = true;
     parts_.push_back({std::move(windows), 0});
   }
   for (Part& part : parts_) part.expected = digest(detector.detect(image_.view(), {}, part.windows));

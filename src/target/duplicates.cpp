@@ -37,9 +37,11 @@ bool same_place(const Detection& a, const Detection& b) {
 
 auto place(const Detection& d) { return std::tie(d.corners, d.center); }
 
-// Best first. A total order: what compares equal is equal in every field that is printed.
+// Best first. A total order: what compares equal is equal in every field that is printed. The earlier search comes
+// before the margin, so that what it read without a wrong bit stands, whatever later ones find.
 bool better(const Detection& a, const Detection& b) {
   if (a.hamming != b.hamming) return a.hamming < b.hamming;
+  if (a.search != b.search) return a.search < b.search;
   if (a.margin != b.margin) return a.margin > b.margin;
   const double area_a = doubled_area(a), area_b = doubled_area(b);
   if (area_a != area_b) return area_a > area_b;

@@ -16,6 +16,9 @@ using Corners = std::array<std::array<double, 2>, 4>;
 
 /// Markers held at the same time; a frame with more is searched whole.
 constexpr std::size_t kMostHeld = 64;
+/// A marker that the whole image's search has read for so many frames is looked for by that search alone. Fewer would
+/// search every other frame whole where noise decides which search reads it.
+constexpr int kSharpFrames = 8;
 /// Frames in flight at the most.
 constexpr int kMostBehind = 1024;
 /// Sides of windows, px: each step up takes 1.2 to 1.6 times the pixels.
@@ -34,6 +37,8 @@ struct Held {
   bool is_foretold = false;
   Corners foretold = {};
   double foretold_slack_px = 0;
+  /// Frames running, up to kSharpFrames, in which the whole image's search read it without a wrong bit.
+  int sharp_frames = 0;
   bool is_seen = false;
 };
 
@@ -186,8 +191,12 @@ struct Tracker::Impl {
       boxes.push_back({box.left - slack, box.top - slack, box.right + slack, box.bottom + slack});
     }
     switch (placement.place(boxes, most_pixels, windows)) {
-      case Placement::Outcome::placed:
+      case Placement::Outcome::placed: {
+        const bool all_sharp = std::all_of(state.held.begin(), state.held.end(),
+                                           [](const Held& marker) { return marker.sharp_frames == kSharpFrames; });
+        for (SearchWindow& window : windows) window.full_resolution_only = all_sharp;
         return SearchReason::held;
+      }
       case Placement::Outcome::border:
         return SearchReason::border;
       case Placement::Outcome::large:
@@ -218,6 +227,8 @@ struct Tracker::Impl {
           }
         }
       }
+      const bool is_sharp = detection.search == 0 && detection.hamming == 0;
+      now.sharp_frames = is_sharp ? std::min(kSharpFrames, (past != nullptr ? past->sharp_frames : 0) + 1) : 0;
       held.push_back(now);
     }
   }

@@ -8,7 +8,7 @@ namespace berth::test {
 
 /// Every bit of two detections: code, corners, what is known of them, pose.
 inline bool same_bits(const Detection& a, const Detection& b) {
-  const auto code = [](const Detection& d) { return std::make_tuple(d.family, d.id, d.hamming, d.margin); };
+  const auto code = [](const Detection& d) { return std::make_tuple(d.family, d.id, d.hamming, d.margin, d.search); };
   if (code(a) != code(b) || a.corners != b.corners || a.center != b.center ||
       a.corner_covariance_px2 != b.corner_covariance_px2) {
     return false;
