@@ -46,8 +46,8 @@ struct DetectorConfig {
   /// Family names; see family_names().
   std::vector<std::string> families = {"tag36h11"};
   /// Most wrong bits a code may have and still be accepted by its bits; never more than the family can correct. Where
-  /// the grey levels speak clearly for one code, a few more bits may lie on the wrong side by a little
-  /// (Detection::hamming tells); 0 rules that out.
+  /// the grey levels speak clearly for one code, bits up to what the family corrects may lie on the wrong side by a
+  /// little (Detection::hamming tells); 0 rules that out.
   int max_hamming = 2;
   /// Camera and marker side (metres, the side the corners span); with both, detections get a pose.
   std::optional<CameraModel> camera;
