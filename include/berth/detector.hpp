@@ -81,8 +81,8 @@ struct SearchWindow {
   int side = 0;
   int x = 0;
   int y = 0;
-  /// Only the whole image's search, without the halved one's two: a third of the work. Markers that it finds without a
-  /// wrong bit are reported, with the bits that the whole frame gives them, and no others.
+  /// Only the whole image's search, without the halved one's two: little more than half of the work. Markers that it
+  /// finds without a wrong bit are reported, with the bits that the whole frame gives them, and no others.
   bool full_resolution_only = false;
 };
 
