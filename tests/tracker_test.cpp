@@ -19,7 +19,6 @@ namespace berth {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr int kWidth = 480, kHeight = 360;
 constexpr double kFrame_s = 1.0 / 60;
