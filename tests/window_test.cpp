@@ -17,6 +17,7 @@
 #include "frame/search_area.hpp"
 #include "sim/corpus.hpp"
 #include "sim/render.hpp"
+#include "support/complaint.hpp"
 #include "support/frame_set.hpp"
 #include "support/pictures.hpp"
 #include "support/same_detection.hpp"
@@ -366,12 +367,7 @@ TEST(Window, RefusesWhatItCannotDo) {
   config.window_sides = {96, 64};
   Detector detector(*backend, 320, 240, config);
   const auto refusal = [&](const std::vector<SearchWindow>& windows) {
-    try {
-      detector.detect(image.view(), {}, windows);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return test::complaint([&] { detector.detect(image.view(), {}, windows); });
   };
   EXPECT_THAT(refusal({{96, 4, 0}}), HasSubstr("multiples of 8"));
   EXPECT_THAT(refusal({{96, 232, 0}}), HasSubstr("in the frame of 320x240"));

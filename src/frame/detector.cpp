@@ -74,6 +74,12 @@ std::vector<BundlePoser> bundle_posers(const std::vector<Bundle>& bundles,
   return posers;
 }
 
+/// Of what was searched in one of the frame's areas.
+StageReader stage_reader(DeviceFrame& frame, std::size_t area) {
+  SearchArea& searched = *frame.areas()[area];
+  return {searched.plan, frame.stream(), searched.place.full_resolution_only};
+}
+
 }  // namespace
 
 struct HostFinish::Impl {
@@ -242,9 +248,9 @@ struct HostFinish::Impl {
 
   static void take_digests(DeviceFrame& frame, FrameResult& result) {
     for (std::size_t k = 0; k < frame.areas().size(); ++k) {
-      MarkerPlan& plan = frame.areas()[k]->plan;
+      const MarkerPlan& plan = frame.areas()[k]->plan;
       const std::string prefix = frame.is_whole(*frame.areas()[k]) ? "" : "window" + std::to_string(k) + "_";
-      StageReader reader(plan, frame.stream(), frame.areas()[k]->place.full_resolution_only);
+      StageReader reader = stage_reader(frame, k);
       for (std::size_t i = 0; i < reader.stages(); ++i) {
         const std::vector<u32>& words = reader.read(i);
         result.digests.push_back({prefix + plan.stages()[i].name, digest_words(words.data(), words.size())});
@@ -358,9 +364,7 @@ std::optional<StageDifference> first_difference(Detector& first, Detector& secon
   DeviceFrame& one = first.impl_->device;
   DeviceFrame& two = second.impl_->device;
   for (std::size_t i = 0; i < one.areas().size(); ++i) {
-    const bool is_first_alone = one.areas()[i]->place.full_resolution_only;
-    StageReader a(one.areas()[i]->plan, one.stream(), is_first_alone);
-    StageReader b(two.areas()[i]->plan, two.stream(), is_first_alone);
+    StageReader a = stage_reader(one, i), b = stage_reader(two, i);
     if (auto difference = first_difference(a, b)) return difference;
   }
   return std::nullopt;

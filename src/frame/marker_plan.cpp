@@ -114,7 +114,6 @@ MarkerPlan::MarkerPlan(Backend& backend, int width, int height, const DetectorCo
   Buffer* pixels = config.flat_field.empty() ? frame_ : add_flat_field(config.flat_field);
   add_search(0, kMiddle, pixels, add_tiles(0, pixels, kNormalizeWhole), pixels, config);
   if (is_window_) full_resolution_plan_ = backend_.record(steps_);
-  full_resolution_stages_ = stages_.size();
   Buffer* half_pixels = add_halve(pixels);
   const Tiles half_tiles = add_tiles(1, half_pixels, kNormalizeHalf);
   add_search(1, kMiddle, half_pixels, half_tiles, pixels, config);

@@ -89,9 +89,8 @@ class MarkerPlan {
   const MarkerGeometry& geometry() const { return searches_.front().geometry; }
   const std::vector<MarkerSearch>& searches() const { return searches_; }
   Plan& plan() { return *plan_; }
-  /// A window's plan up to the whole image's search, and how many stages it has.
+  /// A window's plan up to the whole image's search: its stages are those of search 0.
   Plan& full_resolution_plan() { return *full_resolution_plan_; }
-  std::size_t full_resolution_stages() const { return full_resolution_stages_; }
   const std::vector<Step>& steps() const { return steps_; }
 
   /// Where the padded frame goes: u8[padded_height, padded_width].
@@ -142,7 +141,6 @@ class MarkerPlan {
   std::vector<Stage> stages_;
   std::unique_ptr<Plan> plan_;
   std::unique_ptr<Plan> full_resolution_plan_;  // of a window
-  std::size_t full_resolution_stages_ = 0;
 };
 
 /// Gains as flat_field reads them: two u16 q12 a word, padded like the frame. Throws Error on a wrong number of them or

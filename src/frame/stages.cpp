@@ -4,10 +4,9 @@
 
 namespace berth {
 
-StageReader::StageReader(MarkerPlan& plan, Stream& stream, bool full_resolution_only)
-    : plan_(plan),
-      stream_(stream),
-      stages_(full_resolution_only ? plan.full_resolution_stages() : plan.stages().size()) {
+StageReader::StageReader(MarkerPlan& plan, Stream& stream, bool full_resolution_only) : plan_(plan), stream_(stream) {
+  const auto is_made = [&](const Stage& stage) { return !full_resolution_only || stage.search == 0; };
+  stages_ = static_cast<std::size_t>(std::count_if(plan.stages().begin(), plan.stages().end(), is_made));
   for (const MarkerSearch& search : plan.searches()) {
     searches_.emplace_back();
     fetch(*search.contours, searches_.back().contours);

@@ -28,7 +28,7 @@ class StageReader {
 
   MarkerPlan& plan_;
   Stream& stream_;
-  std::size_t stages_;
+  std::size_t stages_ = 0;
   struct Search {
     std::vector<u32> contours;
     std::vector<u32> quads;
